@@ -1,0 +1,35 @@
+# `make demo` and `make test` do all set-up themselves: see scripts/setup.
+SHELL := /bin/bash
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test test-slow lint bench clean
+
+help:  ## show these targets
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+setup:  ## .venv with the development tools, PostgreSQL with PostGIS from the system's packages
+	@scripts/setup
+
+demo: setup  ## fill a memory with half an hour of a real robot's life and ask it questions
+	@mkdir -p out
+	@.venv/bin/elm demo --picture out/plaza.png
+
+test: setup  ## all tests but the slow ones; in containers too where a Docker engine is at hand
+	@$$ELM_DOCKER_WRAPPER .venv/bin/python -m pytest -m "not slow"
+
+test-slow: setup  ## long fuzzing and memories of 10^6 events
+	@$$ELM_DOCKER_WRAPPER .venv/bin/python -m pytest -m slow
+
+lint: setup  ## ruff and mypy --strict
+	@.venv/bin/ruff check
+	@.venv/bin/ruff format --check
+	@.venv/bin/mypy
+
+bench: setup  ## measure inserts, recalls and type hierarchies; the figures go to out/
+	@mkdir -p out
+	.venv/bin/python -m simulators insert --json out/insert.json
+	.venv/bin/python -m simulators recall --json out/recall.json
+	.venv/bin/python -m simulators types --json out/types.json
+
+clean:  ## remove what these targets made in the checkout
+	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache .hypothesis build dist out
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,111 @@
+"""Settings and wiring: from a DSN to a memory that can be written to and recalled from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from datetime import datetime
+from types import TracebackType
+from typing import Self
+from uuid import UUID
+
+from elm.cues.algebra import Cue
+from elm.event import Event, StoredEvent
+from elm.recollector import OrderName, Recollection, Recollector
+from elm.store import Arrival, Closed, Committed, Cursor, Order, Statistics, Store, TypesAdded
+from elm.taxonomy import EventType
+from elm.writer import LOAD_BATCH, LoadReport, Writer
+
+
+class Memory:
+    """One episodic memory: a writer, a recollector and the types, over one store.
+
+    Use it as a context manager, or call `close()`.
+    """
+
+    def __init__(self, store: Store) -> None:
+        self.store = store
+        self.writer = Writer(store)
+        self.recollector = Recollector(store)
+
+    @property
+    def name(self) -> str:
+        """The memory's name."""
+        return self.store.memory
+
+    def add_types(self, types: Iterable[EventType]) -> TypesAdded:
+        """Add event types and parents, in any order, at any time; a repeated type gains parents."""
+        return self.store.add_types(list(types))
+
+    def add_type(self, name: str, *parents: str) -> TypesAdded:
+        """Add one event type below its parents."""
+        return self.store.add_types([EventType(name=name, parents=parents)])
+
+    def types(self) -> Iterator[EventType]:
+        """All types, parents first."""
+        return self.store.types()
+
+    def commit(self, event: Event, *, recorded_at: datetime | None = None) -> Committed:
+        """Keep one event; see `Writer.commit`."""
+        return self.writer.commit(event, recorded_at=recorded_at)
+
+    def commit_all(self, events: Iterable[Event], *, recorded_at: datetime | None = None) -> list[Committed]:
+        """Keep all of these events or none; see `Writer.commit_all`."""
+        return self.writer.commit_all(events, recorded_at=recorded_at)
+
+    def close_event(self, uid: UUID, end: datetime) -> Closed:
+        """End an event that is still going on; see `Writer.close`."""
+        return self.writer.close(uid, end)
+
+    def load(
+        self,
+        events: Iterable[Event | Arrival],
+        *,
+        progress: Callable[[int], None] | None = None,
+        refused: Callable[[Arrival, str], None] | None = None,
+        batch: int = LOAD_BATCH,
+    ) -> LoadReport:
+        """Keep a long stream of events; see `Writer.load`."""
+        return self.writer.load(events, progress=progress, refused=refused, batch=batch)
+
+    def recall(
+        self,
+        cue: Cue | None = None,
+        *,
+        order: OrderName = Order.BEGIN,
+        limit: int | None = None,
+        after: Cursor | None = None,
+    ) -> Recollection:
+        """The events that match a cue; see `Recollector.recall`."""
+        return self.recollector.recall(cue, order=order, limit=limit, after=after)
+
+    def get(self, name: UUID | int) -> StoredEvent:
+        """The event with this uid or id."""
+        return self.recollector.get(name)
+
+    def statistics(self) -> Statistics:
+        """What the memory holds, in numbers."""
+        return self.store.statistics()
+
+    def close(self) -> None:
+        """Let go of the store's connections."""
+        self.store.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def connect(dsn: str | None = None, memory: str = "elm") -> Memory:
+    """Open a memory.
+
+    `dsn` is a PostgreSQL DSN, or "memory://" for a store in this process; without one the environment's
+    ELM_DSN, else the private cluster, which is created and started on first use. A memory that does not
+    exist is created by its first write.
+    """
+    from elm.storage import open_store
+
+    return Memory(open_store(dsn, memory))

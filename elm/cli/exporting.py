@@ -1,0 +1,102 @@
+"""`elm export`: events in files for other memories and programs."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, BinaryIO
+
+import typer
+
+from elm.cli.cue_options import CueOptions
+from elm.cli.memory_options import MemoryOptions
+from elm.cli.option_groups import takes_groups
+from elm.cli.terminal import progress, say
+
+if TYPE_CHECKING:
+    from elm.event import StoredEvent
+    from elm.recollector import Recollection
+
+
+class ExportFormat(StrEnum):
+    """Formats of files."""
+
+    JSONL = "jsonl"
+    GEOJSON = "geojson"
+    PARQUET = "parquet"
+
+
+@takes_groups
+def export(
+    *,
+    wanted: CueOptions,
+    to: Annotated[
+        Path | None, typer.Option("--to", metavar="FILE", dir_okay=False, help="The file to write. Default: stdout.")
+    ] = None,
+    output: Annotated[ExportFormat, typer.Option("--output", "-o", help="The format.")] = ExportFormat.JSONL,
+    where: MemoryOptions,
+) -> None:
+    """Export the events that match a cue, by default all of them.
+
+    JSON Lines come in id order with all parts of what matches, so that `elm load` reads them into another memory.
+    """
+    cue = wanted.read()
+    if output is ExportFormat.PARQUET and to is None and sys.stdout.isatty():
+        raise typer.BadParameter("parquet is no text for a terminal: name a file", param_hint="--to")
+    with where.open() as memory:
+        found = memory.recall(cue, order="id")
+        total = found.count()
+        with progress("exporting", total=total) as done, _opened(to) as sink:
+            written = _write(found, output, sink, done)
+    added = f", {written - total:,} of them parts of what matched" if written > total else ""
+    say(f"{written:,} events exported{added}")
+
+
+def _write(found: Recollection, form: ExportFormat, sink: BinaryIO, done: Callable[[int], None]) -> int:
+    from elm import exporting
+
+    if form is ExportFormat.PARQUET:
+        return exporting.write_parquet(found, sink, progress=done)
+    counted = _Watched(exporting.with_parts(found) if form is ExportFormat.JSONL else found, done)
+    for chunk in exporting.jsonl(counted) if form is ExportFormat.JSONL else exporting.geojson(counted):
+        sink.write(chunk)
+    return counted.count
+
+
+class _Watched:
+    """Events on their way to a file, counted for the bar."""
+
+    def __init__(self, events: Iterable[StoredEvent], done: Callable[[int], None]) -> None:
+        self._events = events
+        self._done = done
+        self.count = 0
+
+    def __iter__(self) -> Iterator[StoredEvent]:
+        for event in self._events:
+            self.count += 1
+            if self.count % 1_000 == 0:
+                self._done(self.count)
+            yield event
+
+
+@contextmanager
+def _opened(to: Path | None) -> Iterator[BinaryIO]:
+    """The file to write, or stdout; a file is there under its name only when it is whole."""
+    if to is None:
+        yield sys.stdout.buffer
+    elif to.exists() and not to.is_file():
+        with to.open("wb") as device:
+            yield device
+    else:
+        target = to.resolve()
+        unfinished = target.with_name(f"{target.name}.part")
+        try:
+            with unfinished.open("wb") as file:
+                yield file
+            unfinished.replace(target)
+        except BaseException:
+            unfinished.unlink(missing_ok=True)
+            raise

@@ -1,0 +1,90 @@
+"""`elm recall`: the events that match a cue, or how the memory finds them."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from itertools import islice
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from elm.cli.answers import Counted, EventFormat, EventOutput, event_format, write_events
+from elm.cli.cue_options import CueOptions
+from elm.cli.exits import ExitCode
+from elm.cli.memory_options import MemoryOptions
+from elm.cli.option_groups import takes_groups
+from elm.cli.terminal import say
+
+if TYPE_CHECKING:
+    from elm.store import Cursor
+
+TABLE_LIMIT = 100
+"""Rows of a table unless asked otherwise."""
+
+
+class RecallOrder(StrEnum):
+    """In which order events come: by (begin, id), or by that reversed."""
+
+    BEGIN = "begin"
+    REVERSED = "-begin"
+
+
+@takes_groups
+def recall(
+    *,
+    wanted: CueOptions,
+    order: Annotated[RecallOrder, typer.Option("--order", help="By begin, or the latest first.")] = RecallOrder.BEGIN,
+    limit: Annotated[
+        int | None,
+        typer.Option("--limit", min=1, metavar="N", help=f"At most N events. Default: all; {TABLE_LIMIT} in a table."),
+    ] = None,
+    after: Annotated[
+        str | None, typer.Option("--after", metavar="CURSOR", help="Go on where a limited recall ended.")
+    ] = None,
+    explain: Annotated[
+        bool, typer.Option("--explain", help="Show how the memory finds the answer, instead of the answer.")
+    ] = False,
+    output: EventOutput = None,
+    where: MemoryOptions,
+) -> None:
+    """Recall events by a cue; exit code 4 when nothing matches."""
+    cue, cursor, form = wanted.read(), _cursor(after), event_format(output)
+    if explain:
+        from elm.cli.explaining import write_explanation
+
+        with where.open() as memory:
+            found = memory.recall(cue, order=order.value, limit=limit, after=cursor)
+            write_explanation(found.explain(), form)
+        return
+    if limit is None and form is EventFormat.TABLE:
+        limit = TABLE_LIMIT
+    with where.open() as memory:
+        # One more than asked for tells whether there are more.
+        fetched = None if limit is None else limit + 1
+        stream = iter(memory.recall(cue, order=order.value, limit=fetched, after=cursor))
+        shown = Counted(islice(stream, limit))
+        write_events(shown, form)
+        if shown.last is None:
+            say("nothing matched")
+            raise typer.Exit(ExitCode.NOTHING_MATCHED)
+        if limit is not None and next(stream, None) is not None:
+            total = f" of {memory.recall(cue).count():,}" if form is EventFormat.TABLE and cursor is None else ""
+            rest = f"--limit N for more, --after {_cursor_after(shown)} for the next"
+            say(f"{'first' if cursor is None else 'next'} {shown.count:,}{total}; {rest}")
+
+
+def _cursor(after: str | None) -> Cursor | None:
+    from elm.errors import InvalidValue
+    from elm.store import Cursor
+
+    try:
+        return None if after is None else Cursor.parse(after)
+    except InvalidValue as error:
+        raise typer.BadParameter(str(error), param_hint="--after") from error
+
+
+def _cursor_after(shown: Counted) -> Cursor:
+    from elm.store import Cursor
+
+    assert shown.last is not None  # noqa: S101 - asked for only when events were shown
+    return Cursor.after(shown.last)

@@ -1,0 +1,378 @@
+"""The cue nodes: a closed union of frozen values, each one condition of Def 14 or of elm's additions to it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from datetime import timedelta
+from enum import StrEnum
+from typing import TypeVar
+from uuid import UUID
+
+from elm.errors import InvalidValue
+from elm.features import Feature, FeatureValue, as_features, check_value, kind_of
+from elm.geometry import LIMIT, Region, SpatialRelation
+from elm.interval import AllenRelation, Window
+from elm.text import check_name, check_short_name
+
+DEPTH_LIMIT = 100
+"""How deep and/or/not may nest. Chains of one operator are flattened and do not count."""
+
+
+class SetRelation(StrEnum):
+    """How two sets compare, the event's on the left (Def 14)."""
+
+    EQUAL = "equal"
+    SUBSET = "subset"
+    SUPERSET = "superset"
+    INTERSECTS = "intersects"
+    DISJOINT = "disjoint"
+
+
+class TypeRelation(StrEnum):
+    """`exactly` the type, or `is_a`: the type or one of its sub-types."""
+
+    EXACTLY = "exactly"
+    IS_A = "is_a"
+
+
+class Comparison(StrEnum):
+    """How some value of a feature, or a duration, compares with a given one."""
+
+    EQ = "="
+    NE = "!="
+    LT = "<"
+    LE = "<="
+    GT = ">"
+    GE = ">="
+    LIKE = "like"
+
+
+class TimeAxis(StrEnum):
+    """Which time is meant: when it happened, or when the memory learned of it."""
+
+    TIME = "time"
+    RECORDED_AT = "recorded_at"
+
+
+class Place(StrEnum):
+    """Whose place is meant: the observer's region, or the subject's."""
+
+    REGION = "region"
+    SUBJECT = "subject"
+
+
+class Kin(StrEnum):
+    """Which relatives are meant: sub-events or super-events."""
+
+    PARTS = "parts"
+    WHOLES = "wholes"
+
+
+_Name = TypeVar("_Name", bound=StrEnum)
+
+
+def named(given: object, *kinds: type[_Name], what: str) -> _Name:
+    """The member of `kinds` that `given` is or names; anything else is refused, listing what there is."""
+    for kind in kinds:
+        if isinstance(given, kind):
+            return given
+        if isinstance(given, str) and given in {member.value for member in kind}:
+            return kind(given)
+    known = ", ".join(member.value for kind in kinds for member in kind)
+    raise InvalidValue(f"{what} cannot be {given!r}: choose one of {known}")
+
+
+def time_relation(given: object, *, what: str) -> SetRelation | AllenRelation:
+    """The relation in time that `given` is or names: of point sets, or one of Allen's."""
+    relation = named(given, SetRelation, AllenRelation, what=what)
+    assert isinstance(relation, SetRelation | AllenRelation)  # noqa: S101 - named chose among these
+    return relation
+
+
+class Cue:
+    """Base of all cue nodes: combine them with & (and), | (or) and ~ (not)."""
+
+    __slots__ = ()
+
+    @property
+    def depth(self) -> int:
+        """How deep and/or/not are nested here; 0 for a single condition."""
+        return 0
+
+    def __and__(self, other: Cue) -> And:
+        return And(args=(self, _cue(other)))
+
+    def __or__(self, other: Cue) -> Or:
+        return Or(args=(self, _cue(other)))
+
+    def __invert__(self) -> Not:
+        return Not(arg=self)
+
+
+def _cue(given: object) -> Cue:
+    if not isinstance(given, Cue):
+        raise InvalidValue(f"a cue combines with cues, not with {given!r:.80}")
+    return given
+
+
+def _deeper(args: Iterable[Cue]) -> int:
+    depth = 1 + max((arg.depth for arg in args), default=0)
+    if depth > DEPTH_LIMIT:
+        raise InvalidValue(f"a cue may nest and/or/not at most {DEPTH_LIMIT} deep: write it with fewer levels")
+    return depth
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class And(Cue):
+    """Every argument holds; without arguments: everything matches."""
+
+    args: tuple[Cue, ...] = ()
+    depth: int = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        flat = [part for arg in self.args for part in (arg.args if isinstance(arg, And) else (_cue(arg),))]
+        object.__setattr__(self, "args", tuple(flat))
+        object.__setattr__(self, "depth", _deeper(flat))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Or(Cue):
+    """Some argument holds; without arguments: nothing matches."""
+
+    args: tuple[Cue, ...] = ()
+    depth: int = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        flat = [part for arg in self.args for part in (arg.args if isinstance(arg, Or) else (_cue(arg),))]
+        object.__setattr__(self, "args", tuple(flat))
+        object.__setattr__(self, "depth", _deeper(flat))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Not(Cue):
+    """The argument does not hold: also true of events that lack the component it speaks of."""
+
+    arg: Cue
+    depth: int = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "depth", _deeper((_cue(self.arg),)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TypeCue(Cue):
+    """The event's type: exactly this one, or this one and its sub-types."""
+
+    relation: TypeRelation
+    type: str
+
+    def __post_init__(self) -> None:
+        relation = named(self.relation, TypeRelation, what="the relation of a type cue")
+        object.__setattr__(self, "relation", relation)
+        check_short_name(self.type, what="the type of a cue")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TimeCue(Cue):
+    """The event's interval against a window: as point sets, or by Allen's relations.
+
+    On the axis `recorded_at` the interval is the instant at which the memory learned of the event.
+    """
+
+    relation: SetRelation | AllenRelation
+    window: Window
+    axis: TimeAxis = TimeAxis.TIME
+
+    def __post_init__(self) -> None:
+        relation = time_relation(self.relation, what="the relation of a time cue")
+        object.__setattr__(self, "relation", relation)
+        object.__setattr__(self, "axis", named(self.axis, TimeAxis, what="the axis of a time cue"))
+        if not isinstance(self.window, Window):
+            raise InvalidValue(f"a time cue compares with a Window, not with {self.window!r:.80}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RegionCue(Cue):
+    """The event's region or subject against a polygon of one frame.
+
+    False for events without that place, or with one in another frame, `disjoint` included.
+    `distance` in metres, inclusive, goes with `within_distance` only.
+    """
+
+    relation: SpatialRelation
+    region: Region
+    distance: float | None = None
+    place: Place = Place.REGION
+
+    def __post_init__(self) -> None:
+        relation = named(self.relation, SpatialRelation, what="the relation of a region cue")
+        object.__setattr__(self, "relation", relation)
+        object.__setattr__(self, "place", named(self.place, Place, what="the place of a region cue"))
+        if not isinstance(self.region, Region):
+            raise InvalidValue(f"a region cue compares with a Region, not with {self.region!r:.80}")
+        if relation is SpatialRelation.WITHIN_DISTANCE:
+            if isinstance(self.distance, bool) or not isinstance(self.distance, int | float):
+                raise InvalidValue("within_distance needs a distance in metres")
+            if not 0 <= self.distance <= LIMIT:
+                raise InvalidValue(f"the distance must be between 0 and {LIMIT:g} m, not {self.distance!r}")
+            object.__setattr__(self, "distance", float(self.distance))
+        elif self.distance is not None:
+            raise InvalidValue(f"a distance goes with within_distance, not with {relation.value!r}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FeaturesCue(Cue):
+    """The event's set of (name, value) pairs against a given set."""
+
+    relation: SetRelation
+    features: tuple[Feature, ...]
+
+    def __post_init__(self) -> None:
+        relation = named(self.relation, SetRelation, what="the relation of a features cue")
+        object.__setattr__(self, "relation", relation)
+        object.__setattr__(self, "features", as_features(self.features))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FeatureNamesCue(Cue):
+    """The names of the event's features (their projection π1) against a given set."""
+
+    relation: SetRelation
+    names: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        relation = named(self.relation, SetRelation, what="the relation of a feature names cue")
+        object.__setattr__(self, "relation", relation)
+        if isinstance(self.names, str):
+            raise InvalidValue(f"feature names are given as several, not as one text: [{self.names!r}]")
+        names = tuple(dict.fromkeys(self.names))
+        for name in names:
+            check_name(name, what="a feature name of a cue")
+        object.__setattr__(self, "names", names)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FeatureCue(Cue):
+    """Some value of the feature `name` compares so with `value`; values of another kind never do.
+
+    Numbers compare exactly, strings by code point, bools only by = and !=. `like` is for strings:
+    % stands for any text, _ for one character, backslash makes the next character plain.
+    """
+
+    name: str
+    compare: Comparison
+    value: FeatureValue
+
+    def __post_init__(self) -> None:
+        check_name(self.name, what="the feature name of a cue")
+        compare = named(self.compare, Comparison, what="the comparison of a feature cue")
+        object.__setattr__(self, "compare", compare)
+        object.__setattr__(self, "value", check_value(self.name, self.value))
+        kind = kind_of(self.value)
+        if kind == "b" and compare not in (Comparison.EQ, Comparison.NE):
+            raise InvalidValue(f"truth values compare by = and != only, not by {compare.value!r}")
+        if compare is Comparison.LIKE:
+            if kind != "s":
+                raise InvalidValue(f"like compares text with a pattern, not with {self.value!r}")
+            if (len(str(self.value)) - len(str(self.value).rstrip("\\"))) % 2:
+                raise InvalidValue("a like pattern cannot end with a single backslash: write two for a plain one")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PayloadCue(Cue):
+    """The event's payload has exactly these bytes; the media type does not count."""
+
+    data: bytes
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.data, bytes | bytearray | memoryview):
+            raise InvalidValue(f"a payload cue compares bytes, not {type(self.data).__name__}")
+        object.__setattr__(self, "data", bytes(self.data))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AgentCue(Cue):
+    """The event is seen from this agent's perspective."""
+
+    agent: str
+
+    def __post_init__(self) -> None:
+        check_short_name(self.agent, what="the agent of a cue")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DurationCue(Cue):
+    """The event's duration compares so with a given one; false while it is still going on."""
+
+    compare: Comparison
+    duration: timedelta
+
+    def __post_init__(self) -> None:
+        compare = named(self.compare, Comparison, what="the comparison of a duration cue")
+        if compare is Comparison.LIKE:
+            raise InvalidValue("durations compare by = != < <= > >=, not by 'like'")
+        object.__setattr__(self, "compare", compare)
+        if not isinstance(self.duration, timedelta):
+            raise InvalidValue(f"a duration is a timedelta, not {self.duration!r:.80}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KinCue(Cue):
+    """The event's parts or wholes against a set of uids; the direct ones, or all of Def 4 when transitive."""
+
+    relation: SetRelation
+    uids: tuple[UUID, ...]
+    kin: Kin = Kin.PARTS
+    transitive: bool = False
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "kin", named(self.kin, Kin, what="the relatives of a cue"))
+        relation = named(self.relation, SetRelation, what=f"the relation of a {self.kin.value} cue")
+        object.__setattr__(self, "relation", relation)
+        object.__setattr__(self, "uids", _uids(self.uids))
+        if not isinstance(self.transitive, bool):
+            raise InvalidValue(f"transitive is True or False, not {self.transitive!r}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UidCue(Cue):
+    """The event is one of these."""
+
+    uids: tuple[UUID, ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "uids", _uids(self.uids))
+
+
+def _uids(given: Iterable[UUID]) -> tuple[UUID, ...]:
+    uids = tuple(dict.fromkeys(given))
+    for uid in uids:
+        if not isinstance(uid, UUID):
+            raise InvalidValue(f"events are named by their uid (uuid.UUID), not by {uid!r:.80}")
+    return uids
+
+
+Condition = (
+    TypeCue
+    | TimeCue
+    | RegionCue
+    | FeaturesCue
+    | FeatureNamesCue
+    | FeatureCue
+    | PayloadCue
+    | AgentCue
+    | DurationCue
+    | KinCue
+    | UidCue
+)
+"""The nodes that say something of an event themselves."""
+
+Node = And | Or | Not | Condition
+"""Every cue node there is: `match` statements over it end in `assert_never`."""
+
+
+def node(cue: Cue) -> Node:
+    """`cue` as a member of the closed union, for exhaustive matching."""
+    assert isinstance(cue, Node)  # noqa: S101 - Cue has no other subclasses
+    return cue

@@ -1,0 +1,156 @@
+"""Loading events from JSON Lines: a line that cannot be kept is set aside with its reason, the rest are kept."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO
+
+from elm.errors import ElmError, InvalidValue
+from elm.exchange import event_from_json, parse_json, type_from_json
+from elm.store import Arrival
+from elm.taxonomy import EventType
+from elm.writer import Writer
+
+_BYTE_ORDER_MARK = b"\xef\xbb\xbf"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RefusedLine:
+    """A line that was not kept, as it stood in the file, counted from 1, and why."""
+
+    number: int
+    reason: str
+    line: bytes
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FileReport:
+    """What became of a file: events read, kept as new, there already, refused, and fields passed over by name."""
+
+    read: int
+    new: int
+    existing: int
+    refused: int
+    ignored: Mapping[str, int]
+
+
+def load_lines(
+    writer: Writer,
+    lines: Iterable[bytes],
+    *,
+    refused: Callable[[RefusedLine], None],
+    progress: Callable[[int], None] | None = None,
+) -> FileReport:
+    """Keep the event on each line; blank lines are passed over.
+
+    `refused` is told of each line that could not be kept, in the order of the lines; `progress` the bytes dealt
+    with, after each batch. Times of recording are kept; `id` and `wholes` of a result are counted and passed over.
+    """
+    reading = _Reading(lines)
+
+    def batch_done(_: int) -> None:
+        for line in reading.finish_batch():
+            refused(line)
+        if progress is not None:
+            progress(reading.bytes)
+
+    report = writer.load(reading.arrivals(), refused=reading.refuse, progress=batch_done)
+    # Lines that were refused behind the last event belong to no batch.
+    batch_done(report.read)
+    return FileReport(
+        read=reading.events,
+        new=report.new,
+        existing=report.existing,
+        refused=reading.refused,
+        ignored=dict(reading.ignored),
+    )
+
+
+def load_stream(
+    writer: Writer,
+    stream: BinaryIO,
+    *,
+    refused_file: Path,
+    refused: Callable[[RefusedLine], None],
+    progress: Callable[[int], None] | None = None,
+) -> FileReport:
+    """Keep the events of a file or pipe; refused lines go to `refused_file` as they stood, ready to be mended.
+
+    The file replaces one that an earlier load left, and is gone when nothing was refused.
+    """
+    with refused_file.open("wb") as kept:
+
+        def set_aside(line: RefusedLine) -> None:
+            kept.write(line.line + b"\n")
+            kept.flush()
+            refused(line)
+
+        try:
+            report = load_lines(writer, stream, refused=set_aside, progress=progress)
+        finally:
+            # Only a file of ours: a device, /dev/null for one, stays.
+            if kept.tell() == 0 and refused_file.is_file():
+                refused_file.unlink()
+    return report
+
+
+def read_types(lines: Iterable[bytes]) -> list[EventType]:
+    """The event types on these lines; the first line that is none of them refuses all, for others may stand on it."""
+    types: list[EventType] = []
+    for number, line in _numbered(lines):
+        try:
+            types.append(type_from_json(parse_json(line, what="the line")))
+        except ElmError as error:
+            raise InvalidValue(f"line {number}: {error}. No type was added") from error
+    return types
+
+
+class _Reading:
+    """The lines of one load as arrivals, remembering for a batch which line each came from."""
+
+    def __init__(self, lines: Iterable[bytes]) -> None:
+        self._lines = lines
+        self._origins: dict[int, tuple[int, bytes]] = {}
+        self._refused: list[RefusedLine] = []
+        self.bytes = self.events = self.refused = 0
+        self.ignored: Counter[str] = Counter()
+
+    def arrivals(self) -> Iterator[Arrival]:
+        for number, line in _numbered(self._count_bytes()):
+            self.events += 1
+            try:
+                read = event_from_json(parse_json(line, what="the line"))
+            except ElmError as error:
+                self._refused.append(RefusedLine(number=number, reason=str(error), line=line))
+                continue
+            self.ignored.update(read.ignored)
+            arrival = Arrival(event=read.event, recorded_at=read.recorded_at)
+            # By identity: two lines may hold equal events. The batch keeps its arrivals alive until it is done.
+            self._origins[id(arrival)] = number, line
+            yield arrival
+
+    def refuse(self, arrival: Arrival, reason: str) -> None:
+        number, line = self._origins[id(arrival)]
+        self._refused.append(RefusedLine(number=number, reason=reason, line=line))
+
+    def finish_batch(self) -> list[RefusedLine]:
+        found = sorted(self._refused, key=lambda line: line.number)
+        self.refused += len(found)
+        self._refused.clear()
+        self._origins.clear()
+        return found
+
+    def _count_bytes(self) -> Iterator[bytes]:
+        for line in self._lines:
+            self.bytes += len(line)
+            yield line
+
+
+def _numbered(lines: Iterable[bytes]) -> Iterator[tuple[int, bytes]]:
+    for number, line in enumerate(lines, start=1):
+        text = line.removeprefix(_BYTE_ORDER_MARK) if number == 1 else line
+        if text.strip():
+            yield number, text.removesuffix(b"\n")

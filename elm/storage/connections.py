@@ -1,0 +1,194 @@
+"""Connections to PostgreSQL: opened with the settings that writing and recalling want, their errors translated."""
+
+from __future__ import annotations
+
+import weakref
+from collections import deque
+from collections.abc import Iterator
+from contextlib import contextmanager
+from threading import Lock
+from typing import Any
+from weakref import WeakSet
+
+import psycopg
+from psycopg import sql
+from psycopg.types.string import ByteaBinaryLoader
+
+from elm.errors import (
+    DatabaseUnfit,
+    DatabaseUnreachable,
+    ElmError,
+    MemoryMissing,
+    StoreClosed,
+    StoreFailure,
+)
+
+Connection = psycopg.Connection[Any]
+
+MINIMUM_SERVER = 14
+"""The oldest PostgreSQL that has multiranges, from which the span of a complex event is derived."""
+
+_SESSION = {
+    "TimeZone": "UTC",
+    "jit": "off",
+    "random_page_cost": "1.1",
+    "work_mem": "64MB",
+}
+# The write statements are always the same plan; finding it anew would cost more than running it.
+WRITING = {"plan_cache_mode": "force_generic_plan"}
+# A recall's best plan depends on the cue's values, and starting parallel workers costs more than they save.
+RECALLING = {"plan_cache_mode": "force_custom_plan", "max_parallel_workers_per_gather": "0"}
+
+# Decoded by elm, when somebody looks: until then the bytes as they came.
+_RAW_OIDS = (
+    *(psycopg.adapters.types[name].oid for name in ("uuid", "tstzrange", "timestamptz", "json")),
+    psycopg.adapters.types["uuid"].array_oid,
+)
+
+
+@contextmanager
+def translated(memory: str) -> Iterator[None]:
+    """Turns the driver's errors into elm's; nothing else knows psycopg's classes."""
+    try:
+        yield
+    except psycopg.Error as error:
+        raise _translate(error, memory) from error
+
+
+def _translate(error: psycopg.Error, memory: str) -> ElmError:
+    said = str(error.diag.message_primary or error).strip()
+    match error:
+        case psycopg.errors.InsufficientPrivilege():
+            return DatabaseUnfit(
+                f"the database user lacks rights for memory {memory!r}: {said}. "
+                f"Grant them (CREATE on the database for a new memory, all on schema {memory!r} for an existing one)"
+            )
+        case psycopg.errors.UndefinedTable() | psycopg.errors.InvalidSchemaName():
+            return MemoryMissing(f"memory {memory!r} is missing or incomplete: {said}. Run `elm migrate`")
+        case psycopg.errors.DiskFull() | psycopg.errors.OutOfMemory() | psycopg.errors.ProgramLimitExceeded():
+            return DatabaseUnfit(f"the database server is out of room for this: {said}")
+        case psycopg.errors.ReadOnlySqlTransaction():
+            return DatabaseUnfit(f"the database is read-only: {said}. Connect to the primary server to write")
+        case psycopg.errors.QueryCanceled():
+            return StoreFailure(f"the database cancelled a statement: {said}")
+        case psycopg.OperationalError() | psycopg.InterfaceError():
+            return DatabaseUnreachable(f"the connection to the database was lost: {said}. Try again")
+        case _:
+            return StoreFailure(
+                f"the database refused a statement on memory {memory!r}: {said} "
+                f"(SQLSTATE {error.sqlstate}). Please report this with the output of `elm doctor`"
+            )
+
+
+def open_connection(dsn: str, settings: dict[str, str], *, memory: str | None = None) -> Connection:
+    """A connection in autocommit mode whose search_path leads into `memory`."""
+    try:
+        connection = psycopg.connect(dsn, autocommit=True, fallback_application_name="elm")
+    except psycopg.ProgrammingError as error:
+        raise DatabaseUnreachable(
+            f"this is not a PostgreSQL DSN: {str(error).strip()}. Write it like postgresql://user@host:5432/database"
+        ) from error
+    except psycopg.OperationalError as error:
+        raise _unreachable(dsn, error) from error
+    if connection.info.server_version < MINIMUM_SERVER * 10_000:
+        version = connection.info.parameter_status("server_version")
+        connection.close()
+        raise DatabaseUnfit(f"PostgreSQL {version} is too old: elm needs {MINIMUM_SERVER} or newer")
+    with translated(memory or ""):
+        # PostGIS may live in any schema: find it, for the memory's own must come first in the path.
+        row = connection.execute(
+            "SELECT n.nspname, t.oid FROM pg_extension e JOIN pg_namespace n ON n.oid = e.extnamespace"
+            " JOIN pg_type t ON t.typnamespace = n.oid AND t.typname = 'geometry' WHERE e.extname = 'postgis'"
+        ).fetchone()
+        path = [sql.Identifier(name) for name in (memory, row[0] if row else None) if name]
+        chosen = [
+            sql.SQL("SET {} = {}").format(sql.Identifier(name), sql.Literal(value))
+            for name, value in {**_SESSION, **settings}.items()
+        ]
+        if path:
+            chosen.append(sql.SQL("SET search_path = {}").format(sql.SQL(", ").join(path)))
+        connection.execute(sql.SQL("; ").join(chosen))
+    if row:
+        connection.adapters.register_loader(row[1], ByteaBinaryLoader)
+    for oid in _RAW_OIDS:
+        connection.adapters.register_loader(oid, ByteaBinaryLoader)
+    return connection
+
+
+def _unreachable(dsn: str, error: psycopg.OperationalError) -> ElmError:
+    # libpq's further lines only ask whether the server is running.
+    said = (str(error).strip() or "no answer").splitlines()[0]
+    shown = psycopg.conninfo.conninfo_to_dict(dsn)
+    where = f"{shown.get('host') or 'the local socket'}, database {shown.get('dbname') or 'of the default name'!r}"
+    return DatabaseUnreachable(
+        f"no database at {where}: {said}. Start the server, or correct the DSN "
+        f"(--dsn or ELM_DSN; without one elm runs a private server: `elm up`)"
+    )
+
+
+class Connections:
+    """The connections of one store: one to write with, and as many to recall with as results are being read."""
+
+    def __init__(self, dsn: str, memory: str) -> None:
+        self._dsn = dsn
+        self._memory = memory
+        self._closed = False
+        self._lock = Lock()
+        self._idle: deque[Connection] = deque()
+        self._writing: Connection | None = None
+        self._write_lock = Lock()
+        self._opened: WeakSet[Connection] = WeakSet()
+        # A memory that nobody closed lets go of the server too, without the driver's warning.
+        weakref.finalize(self, _close_all, self._opened)
+
+    def _open(self, settings: dict[str, str]) -> Connection:
+        connection = open_connection(self._dsn, settings, memory=self._memory)
+        self._opened.add(connection)
+        return connection
+
+    @contextmanager
+    def writing(self) -> Iterator[Connection]:
+        """The connection that writes, one caller at a time."""
+        with self._write_lock:
+            self._check_open()
+            if self._writing is None or self._writing.closed:
+                self._writing = self._open(WRITING)
+            with translated(self._memory):
+                yield self._writing
+
+    @contextmanager
+    def recalling(self) -> Iterator[Connection]:
+        """A connection to recall with, to one caller at a time; handed on when the caller is done."""
+        self._check_open()
+        with self._lock:
+            connection = self._idle.pop() if self._idle else None
+        if connection is None or connection.closed:
+            connection = self._open(RECALLING)
+        try:
+            with translated(self._memory):
+                yield connection
+        finally:
+            reusable = connection.info.transaction_status == psycopg.pq.TransactionStatus.IDLE
+            if self._closed or not reusable:
+                connection.close()
+            else:
+                with self._lock:
+                    self._idle.append(connection)
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise StoreClosed(f"memory {self._memory!r} was closed: open it again with elm.connect")
+
+    def close(self) -> None:
+        """Close all connections; one that a result is still being read from closes when that ends."""
+        self._closed = True
+        with self._lock:
+            while self._idle:
+                self._idle.pop().close()
+        if self._writing is not None:
+            self._writing.close()
+
+
+def _close_all(connections: WeakSet[Connection]) -> None:
+    for connection in connections:
+        connection.close()

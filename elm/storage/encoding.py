@@ -1,0 +1,121 @@
+"""Events as rows: the columns that are written, each in PostgreSQL's binary format, ready to be sent as they are."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from datetime import UTC, datetime, timedelta
+from uuid import UUID
+
+import msgspec
+
+from elm.event import Event, content_hash
+from elm.features import name_tokens, tokens
+from elm.geometry import Region
+from elm.interval import Interval
+
+COLUMNS = (
+    "uid",
+    "type_id",
+    "period",
+    "frame_id",
+    "region",
+    "subject_frame_id",
+    "subject",
+    "feature_tokens",
+    "feature_names",
+    "features",
+    "agent",
+    "media_type",
+    "payload",
+    "parts",
+    "recorded_at",
+    "content",
+)
+"""The order in which a row's values stand, and the parameters $1, $2 ... of the write statements."""
+
+Row = tuple[bytes | None, ...]
+
+_PG_EPOCH = datetime(2000, 1, 1, tzinfo=UTC)
+_MICROSECOND = timedelta(microseconds=1)
+_UUID_OID, _TEXT_OID = 2950, 25
+
+int4: Callable[[int], bytes] = struct.Struct("!i").pack
+"""An integer of 32 bits."""
+_int8 = struct.Struct("!q").pack
+_bounded = struct.Struct("!Biqiq").pack
+_open = struct.Struct("!Biq").pack
+_BOTH_INCLUSIVE, _LOWER_INCLUSIVE_UPPER_INFINITE = 0x06, 0x12
+_array = struct.Struct("!iiiii").pack
+_no_array = struct.Struct("!iii").pack
+_uuid_item = struct.Struct("!i16s").pack
+
+
+def timestamp(moment: datetime) -> bytes:
+    """A UTC datetime as timestamptz."""
+    return _int8((moment - _PG_EPOCH) // _MICROSECOND)
+
+
+def period(interval: Interval) -> bytes:
+    """An interval as tstzrange: both ends inclusive, or no upper end."""
+    begin = (interval.begin - _PG_EPOCH) // _MICROSECOND
+    if interval.end is None:
+        return _open(_LOWER_INCLUSIVE_UPPER_INFINITE, 8, begin)
+    return _bounded(_BOTH_INCLUSIVE, 8, begin, 8, (interval.end - _PG_EPOCH) // _MICROSECOND)
+
+
+def uuids(uids: Sequence[UUID]) -> bytes:
+    """Several uids as uuid[]."""
+    if not uids:
+        return _no_array(0, 0, _UUID_OID)
+    return _array(1, 0, _UUID_OID, len(uids), 1) + b"".join([_uuid_item(16, uid.bytes) for uid in uids])
+
+
+def texts(values: Sequence[str]) -> bytes:
+    """Several texts as text[]."""
+    if not values:
+        return _no_array(0, 0, _TEXT_OID)
+    items = [_array(1, 0, _TEXT_OID, len(values), 1)]
+    for value in values:
+        data = value.encode()
+        items += (int4(len(data)), data)
+    return b"".join(items)
+
+
+def row(event: Event, *, types: Mapping[str, int], frames: Mapping[str, int], recorded_at: datetime) -> Row:
+    """The values of an event's `COLUMNS`; None is NULL. Extents of a complex event are those given, if any."""
+    payload = event.payload
+    return (
+        event.uid.bytes,
+        int4(types[event.type]),
+        None if event.interval is None else period(event.interval),
+        *_place(event.region, frames),
+        *_place(event.subject, frames),
+        texts(tokens(event.features)),
+        texts(name_tokens(name for name, _ in event.features)),
+        msgspec.json.encode(event.features),
+        None if event.agent is None else event.agent.encode(),
+        None if payload is None else payload.media_type.encode(),
+        None if payload is None else payload.data,
+        uuids(event.parts),
+        timestamp(recorded_at),
+        content_hash(event),
+    )
+
+
+def _place(region: Region | None, frames: Mapping[str, int]) -> tuple[bytes | None, bytes | None]:
+    return (None, None) if region is None else (int4(frames[region.frame]), region.wkb)
+
+
+COPY_BEGIN = b"PGCOPY\n\xff\r\n\x00" + bytes(8)
+"""What a binary COPY begins with."""
+COPY_END = b"\xff\xff"
+"""What a binary COPY ends with."""
+
+
+def copied(values: Iterable[bytes | None], count: int) -> bytes:
+    """One row of `count` values in the format of a binary COPY."""
+    pieces = [count.to_bytes(2)]
+    for value in values:
+        pieces += (b"\xff\xff\xff\xff",) if value is None else (int4(len(value)), value)
+    return b"".join(pieces)

@@ -1,0 +1,122 @@
+"""Writing events to the database: one, several in one transaction, a batch by COPY, and the end of an open one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from datetime import UTC, datetime
+from uuid import UUID
+
+from elm.errors import ConflictingContent, CycleRefused, ExtentRefused, InvalidValue, UnknownEvent
+from elm.event import Event, StoredEvent, content_hash
+from elm.storage import encoding, prepared
+from elm.storage import write_statements as sql
+from elm.storage.connections import Connection
+from elm.storage.names import NameCache
+from elm.store import Arrival, Closed, Committed
+
+
+def encoded(arrivals: Sequence[Arrival], names: NameCache, now: datetime) -> list[encoding.Row]:
+    """The rows of arrivals; unknown types are an error, new frames are added."""
+    events = [arrival.event for arrival in arrivals]
+    types = names.type_ids([event.type for event in events])
+    places = (place for event in events for place in (event.region, event.subject))
+    frames = names.frame_ids([place.frame for place in places if place is not None])
+    return [
+        encoding.row(arrival.event, types=types, frames=frames, recorded_at=arrival.recorded_at or now)
+        for arrival in arrivals
+    ]
+
+
+def commit(connection: Connection, event: Event, row: encoding.Row, now: datetime) -> Committed | None:
+    """Write one event; None when it was not taken."""
+    name, statement = ("elm_complex", sql.COMMIT_COMPLEX) if event.parts else ("elm_atomic", sql.COMMIT_ATOMIC)
+    found = prepared.run(connection, name, statement, (*row, encoding.timestamp(now)))
+    if not found:
+        return None
+    (number, existed), *_ = found
+    assert number is not None  # noqa: S101 - a primary key
+    return Committed(id=int.from_bytes(number), uid=event.uid, new=existed == b"\0")
+
+
+def wholes_last(arrivals: Sequence[Arrival]) -> list[Arrival]:
+    """The arrivals, each once, level by level: those without parts among them first, then their wholes.
+
+    A ring of parts is refused, and so is another event under a uid that stands before.
+    """
+    known: dict[UUID, Arrival] = {}
+    for arrival in arrivals:
+        event = arrival.event
+        first = known.setdefault(event.uid, arrival).event
+        if first is not event and content_hash(first) != content_hash(event):
+            raise ConflictingContent(f"two different events of one call have the uid {event.uid}: give one a new uid")
+    waiting = {uid: {part for part in arrival.event.parts if part in known} for uid, arrival in known.items()}
+    ordered: list[Arrival] = []
+    done: set[UUID] = set()
+    while waiting:
+        level = [uid for uid, parts in waiting.items() if parts <= done]
+        if not level:
+            ring = ", ".join(sorted(map(str, waiting))[:5])
+            raise CycleRefused(f"events of one call are parts of themselves, through each other; among them: {ring}")
+        ordered += [known[uid] for uid in level]
+        done.update(level)
+        for uid in level:
+            del waiting[uid]
+    return ordered
+
+
+def why_refused(event: Event, parts: Iterable[StoredEvent]) -> Exception:
+    """The reason for which the database did not take a new event, whose stored parts are `parts`."""
+    known = {part.uid for part in parts}
+    if missing := [str(uid) for uid in event.parts if uid not in known]:
+        return UnknownEvent(
+            f"event {event.uid} has parts that are not in the memory: {', '.join(missing[:5])}"
+            f"{' ...' if len(missing) > 5 else ''}. Commit them first"
+        )
+    if event.parts and (event.interval or event.region or event.subject):
+        return ExtentRefused(
+            f"an extent given for the complex event {event.uid} is not the one its parts have: leave interval, "
+            f"region and subject out, they derive; commit an instant event as a part for a bound that no part has"
+        )
+    return ConflictingContent(f"event {event.uid} was being written by another process just now: try again")
+
+
+def refuse_other(event: Event, stored: StoredEvent) -> None:
+    """Refuse an event whose uid is taken, unless it equals the stored event as it stands now."""
+    if content_hash(stored.as_event()) != content_hash(event):
+        raise ConflictingContent(
+            f"the uid {event.uid} is taken by an event of other content "
+            f"(id {stored.id}, type {stored.type!r}): use a new uid"
+        )
+
+
+def close(connection: Connection, uid: UUID, end: datetime) -> Closed | None:
+    """End an open atomic event and recompute its wholes; None when there was nothing to end."""
+    now = datetime.now(UTC)
+    row = connection.execute(sql.CLOSE_EVENT, {"uid": uid, "end": end}).fetchone()
+    if row is None:
+        return None
+    number, agent = row
+    log = [{"id": number, "agent": agent, "now": now}]
+    closed: list[UUID] = []
+    for whole, whole_uid, was_open in connection.execute(sql.LOCK_WHOLES, {"id": number}, binary=True):
+        found = connection.execute(sql.RECOMPUTE_WHOLE, {"id": whole}).fetchone()
+        assert found is not None  # noqa: S101 - the row is locked
+        still_open, whole_agent = found
+        if was_open and not still_open:
+            closed.append(UUID(bytes=whole_uid))
+            log.append({"id": whole, "agent": whole_agent, "now": now})
+    connection.cursor().executemany(sql.LOG_CLOSED, log)
+    return Closed(new=True, wholes=tuple(closed))
+
+
+def why_not_closed(uid: UUID, end: datetime, stored: StoredEvent | None) -> Closed:
+    """Nothing to do for an event that ended just then; otherwise the reason why it cannot be ended."""
+    if stored is None:
+        raise UnknownEvent(f"there is no event {uid} to close: commit it first")
+    if stored.parts:
+        raise InvalidValue(f"event {uid} is complex: it ends when its last open part is closed")
+    if end < stored.interval.begin:
+        raise InvalidValue(f"event {uid} began at {stored.interval.begin.isoformat()}: it cannot end before")
+    if stored.interval.end != end:
+        raise InvalidValue(f"event {uid} has already ended, at {stored.interval}: an end is given once")
+    return Closed(new=False, wholes=())

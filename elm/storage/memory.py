@@ -1,0 +1,204 @@
+"""The store in this process: the working memory of a robot without a database, and the judge of every other store."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from datetime import datetime
+from itertools import islice
+from threading import Lock
+from typing import Any
+from uuid import UUID
+
+from elm.columns import batches_of, reader_of
+from elm.cues.algebra import And, Cue
+from elm.cues.codec import cue_to_json
+from elm.errors import StoreClosed
+from elm.event import StoredEvent, content_hash
+from elm.exchange import to_line
+from elm.interval import as_utc
+from elm.storage.memory_answers import grouped, nearest_first, neighbours
+from elm.storage.memory_changes import Changes, InboxRow
+from elm.storage.memory_index import EventIndex, View, conjuncts
+from elm.store import (
+    Arrival,
+    BatchReport,
+    ByFeature,
+    Closed,
+    Committed,
+    ConditionRows,
+    Explanation,
+    Group,
+    Grouping,
+    Join,
+    Nearest,
+    Query,
+    Statistics,
+    TypesAdded,
+)
+from elm.taxonomy import EventType, Taxonomy
+
+
+class MemoryStore:
+    """One memory in this process, behind the port `elm.store.Store`; nothing of it outlives the process.
+
+    Every cue is judged by `elm.cues.match`; indexes only spare it events that cannot match. Threads may
+    share a store. An answer is that of one moment, whatever is written while it is read.
+    """
+
+    def __init__(self, memory: str = "elm") -> None:
+        self.memory = memory
+        self._lock = Lock()
+        self._is_open = True
+        self._taxonomy = Taxonomy()
+        self._is_a_links: set[tuple[str, str]] = set()
+        self._index = EventIndex()
+        self._changes = Changes(self._index, self._taxonomy)
+
+    @property
+    def log_inbox(self) -> list[InboxRow]:
+        """What was committed and closed, in that order, for consumers of the log."""
+        return self._changes.log_inbox
+
+    @contextmanager
+    def _locked(self) -> Iterator[None]:
+        with self._lock:
+            if not self._is_open:
+                raise StoreClosed(f"memory {self.memory!r} was closed: open it again with elm.connect")
+            yield
+
+    def close(self) -> None:
+        """Refuse further calls; closing again changes nothing."""
+        with self._lock:
+            self._is_open = False
+
+    # Types
+
+    def add_types(self, types: Sequence[EventType]) -> TypesAdded:
+        """Add types and parents, in any order; cycles and unknown parents refuse the whole call."""
+        with self._locked():
+            known, links = len(self._taxonomy), len(self._is_a_links)
+            closure = len(self._taxonomy.add(types))
+            self._is_a_links.update((event_type.name, parent) for event_type in types for parent in event_type.parents)
+            return TypesAdded(types=len(self._taxonomy) - known, links=len(self._is_a_links) - links, closure=closure)
+
+    def types(self) -> Iterator[EventType]:
+        """All types, parents first."""
+        with self._locked():
+            return iter(self._taxonomy)
+
+    # Writing
+
+    def commit(self, arrival: Arrival) -> Committed:
+        """Keep one event whose parts are all in the memory."""
+        return self.commit_all([arrival])[0]
+
+    def commit_all(self, arrivals: Sequence[Arrival]) -> list[Committed]:
+        """Keep all or none; events may be parts of each other in any order, and are numbered parts first."""
+        contents = [content_hash(arrival.event) for arrival in arrivals]
+        with self._locked():
+            return self._changes.keep(arrivals, contents)
+
+    def load(self, arrivals: Sequence[Arrival]) -> BatchReport:
+        """Keep what can be kept of a batch whose parts come before their wholes or are in the memory."""
+        contents = [content_hash(arrival.event) for arrival in arrivals]
+        with self._locked():
+            return self._changes.load(arrivals, contents)
+
+    def finish_load(self) -> None:
+        """Nothing is left to do after a load."""
+        with self._locked():
+            return
+
+    def close_event(self, uid: UUID, end: datetime) -> Closed:
+        """End an open event and recompute the extents of all its wholes; the same end again changes nothing."""
+        end = as_utc(end, what="the end of an event")
+        with self._locked():
+            return self._changes.close(uid, end)
+
+    # Reading
+
+    def _views(self, *queries: Query) -> list[View]:
+        """The candidates for each query, all as of one moment."""
+        with self._locked():
+            return [self._index.view(query, self._taxonomy) for query in queries]
+
+    def find(self, query: Query) -> Iterator[StoredEvent]:
+        """The events a query asks for, as of this call; each is judged when it is asked for."""
+        (view,) = self._views(query)
+        return _answers(view, query)
+
+    def ids(self, query: Query) -> Iterator[int]:
+        """Their ids alone."""
+        return (event.id for event in self.find(query))
+
+    def count(self, cue: Cue) -> int:
+        """How many events match."""
+        return sum(1 for _ in self.find(Query(cue=cue)))
+
+    def exists(self, cue: Cue) -> bool:
+        """Whether any event matches."""
+        return next(self.find(Query(cue=cue)), None) is not None
+
+    def groups(self, cue: Cue, by: Grouping | ByFeature) -> list[Group]:
+        """The matching events by key, keys in ascending order, None last."""
+        return grouped(self.find(Query(cue=cue)), by)
+
+    def join(self, join: Join) -> Iterator[tuple[StoredEvent, StoredEvent | None]]:
+        """Each anchor, in order, with the neighbour found for it."""
+        anchors, others = self._views(join.anchors, Query(cue=join.cue))
+        return neighbours(_answers(anchors, join.anchors), iter(others), join.relation, same_region=join.same_region)
+
+    def get(self, ids: Sequence[int]) -> list[StoredEvent]:
+        """The events with these ids, in id order; unknown ids are left out."""
+        with self._locked():
+            return [self._index.events[number] for number in sorted(set(ids)) if number in self._index.events]
+
+    def explain(self, query: Query) -> Explanation:
+        """How many candidates were judged, and what each condition keeps."""
+        parts = conjuncts(query.cue)
+        alone = [Query(cue=part) for part in parts]
+        left = [Query(cue=And(args=parts[: count + 1])) for count in range(len(parts))]
+        view, *views = self._views(query, *alone, *left)
+        counts = [sum(1 for _ in each) for each in views]
+        return Explanation(
+            sql="",
+            parameters={},
+            plan=f"scan of {len(view.candidates)} candidates",
+            events=len(self._index.events),
+            conditions=tuple(
+                ConditionRows(condition=to_line(cue_to_json(part)), alone=by_itself, left=together)
+                for part, by_itself, together in zip(parts, counts, counts[len(parts) :], strict=False)
+            ),
+        )
+
+    def arrow(self, query: Query) -> Any:
+        """The events as a pyarrow.RecordBatchReader in the schema of `elm.columns`."""
+        return reader_of(batches_of(self.find(query)))
+
+    def statistics(self) -> Statistics:
+        """What the memory holds, in numbers."""
+        with self._locked():
+            events = [*self._index.events.values()]
+            types, frames = len(self._taxonomy), len(self._index.frames)
+        begins = [event.interval.begin for event in events]
+        return Statistics(
+            events=len(events),
+            complex_events=sum(event.is_complex for event in events),
+            open_events=sum(event.interval.is_open for event in events),
+            links=sum(len(event.parts) for event in events),
+            types=types,
+            frames=frames,
+            agents=len({event.agent for event in events if event.agent is not None}),
+            first_begin=min(begins, default=None),
+            last_begin=max(begins, default=None),
+            last_recorded_at=max((event.recorded_at for event in events), default=None),
+            bytes=None,
+        )
+
+
+def _answers(view: View, query: Query) -> Iterator[StoredEvent]:
+    candidates = view.candidates
+    if isinstance(query.order, Nearest):
+        candidates = nearest_first(candidates, query.order)
+    return islice(view.matching(candidates), query.limit)

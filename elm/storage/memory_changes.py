@@ -1,0 +1,153 @@
+"""What writing does to the store in this process: events come and end, their wholes follow, the log is kept."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from uuid import UUID
+
+from elm.cues.algebra import Kin
+from elm.errors import ConflictingContent, ElmError, InvalidValue, UnknownEvent
+from elm.event import Event, StoredEvent, content_hash
+from elm.interval import Interval, as_utc
+from elm.storage.memory_events import as_stored, changed, parts_first, span
+from elm.storage.memory_index import EventIndex
+from elm.store import Arrival, BatchReport, Closed, Committed, Refusal
+from elm.taxonomy import Taxonomy
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InboxRow:
+    """One entry of the log, in the order of writing: an event came (`commit`), or ended (`close`)."""
+
+    n: int
+    event_id: int
+    kind: str
+    agent: str | None
+    at: datetime
+
+
+class Changes:
+    """Writes events to an index. Not locked: its store does that."""
+
+    def __init__(self, index: EventIndex, taxonomy: Taxonomy) -> None:
+        self.log_inbox: list[InboxRow] = []
+        self._index = index
+        self._taxonomy = taxonomy
+        self._contents: dict[UUID, bytes] = {}
+
+    def keep(self, arrivals: Sequence[Arrival], contents: Sequence[bytes]) -> list[Committed]:
+        """Keep all of the arrivals, whose content hashes are `contents`, or none: all is checked before any is."""
+        new: dict[UUID, tuple[Arrival, bytes]] = {}
+        for arrival, content in zip(arrivals, contents, strict=True):
+            event = arrival.event
+            self._taxonomy.check(event.type)
+            if event.uid in self._index:
+                self._check_same(event, content)
+            elif new.setdefault(event.uid, (arrival, content))[1] != content:
+                raise ConflictingContent(f"uid {event.uid} is given to two different events: give one a new uid")
+        self._check_parts(new)
+        staged = self._staged({uid: arrival for uid, (arrival, _) in new.items()})
+        for stored in staged.values():
+            self._index.add(stored)
+            self._contents[stored.uid] = new[stored.uid][1]
+            for part in stored.parts:
+                known = self._index[part]
+                self._index.replace(changed(known, wholes=(*known.wholes, stored.uid)))
+        self._log("commit", staged.values())
+        return [
+            Committed(id=self._index.ids[uid], uid=uid, new=staged.pop(uid, None) is not None)
+            for uid in (arrival.event.uid for arrival in arrivals)
+        ]
+
+    def _check_same(self, event: Event, content: bytes) -> None:
+        """An event whose uid is there must be what was committed, or what that has become."""
+        stored = self._index[event.uid]
+        if content != self._contents[event.uid] and content != content_hash(stored.as_event()):
+            raise ConflictingContent(
+                f"uid {event.uid} is taken by another event, of type {stored.type!r}: "
+                f"use a new uid, or commit the same content"
+            )
+
+    def _check_parts(self, new: Mapping[UUID, tuple[Arrival, bytes]]) -> None:
+        for arrival, _ in new.values():
+            for part in arrival.event.parts:
+                if part not in new and part not in self._index:
+                    raise UnknownEvent(
+                        f"event {arrival.event.uid} has the unknown part {part}: commit that event first"
+                    )
+
+    def _staged(self, new: Mapping[UUID, Arrival]) -> dict[UUID, StoredEvent]:
+        """The new events as they will be kept, parts first, numbered in that order."""
+        now = datetime.now(UTC)
+        staged: dict[UUID, StoredEvent] = {}
+        for event in parts_first(arrival.event for arrival in new.values()):
+            recorded_at = new[event.uid].recorded_at
+            staged[event.uid] = as_stored(
+                event,
+                [staged[part] if part in staged else self._index[part] for part in event.parts],
+                number=len(self._index) + len(staged) + 1,
+                recorded_at=now if recorded_at is None else as_utc(recorded_at, what="recorded_at"),
+            )
+        return staged
+
+    def load(self, arrivals: Sequence[Arrival], contents: Sequence[bytes]) -> BatchReport:
+        """Keep, one after the other, the arrivals that can be kept."""
+        new = existing = 0
+        refused: dict[int, Refusal] = {}
+        lost: set[UUID] = set()
+        for index, (arrival, content) in enumerate(zip(arrivals, contents, strict=True)):
+            try:
+                self._refuse_lost_parts(arrival.event, lost)
+                (committed,) = self.keep([arrival], [content])
+            except ElmError as error:
+                refused[index] = Refusal(index=index, reason=str(error))
+                lost.add(arrival.event.uid)
+            else:
+                new += committed.new
+                existing += not committed.new
+        return BatchReport(new=new, existing=existing, refused=tuple(refused.values()))
+
+    def _refuse_lost_parts(self, event: Event, lost: set[UUID]) -> None:
+        for part in event.parts:
+            if part in lost and part not in self._index:
+                raise UnknownEvent(f"event {event.uid} has the part {part}, which was refused: correct that one first")
+
+    def close(self, uid: UUID, end: datetime) -> Closed:
+        """End the open event `uid`; wholes of which it was the last open part end with it."""
+        if uid not in self._index:
+            raise UnknownEvent(f"there is no event {uid} to close: commit it first")
+        event = self._index[uid]
+        if event.parts:
+            raise InvalidValue(f"event {uid} has parts, from which its end derives: close those that are open")
+        begin, known = event.interval.begin, event.interval.end
+        if known == end:
+            return Closed(new=False, wholes=())
+        if known is not None:
+            raise InvalidValue(f"event {uid} ended at {known.isoformat()}: it cannot end at {end.isoformat()} as well")
+        if end < begin:
+            raise InvalidValue(f"event {uid} began at {begin.isoformat()}: it cannot end at {end.isoformat()}, before")
+        ended = changed(event, interval=Interval(begin=begin, end=end))
+        self._index.replace(ended)
+        # Ids grow from parts to wholes: in their order each whole sees its parts as they are by now.
+        above = sorted(self._index.ids[whole] for whole in self._index.kin(uid, Kin.WHOLES, transitive=True))
+        closed = [whole for number in above if (whole := self._close_whole(number)) is not None]
+        self._log("close", [ended, *closed])
+        return Closed(new=True, wholes=tuple(whole.uid for whole in closed))
+
+    def _close_whole(self, number: int) -> StoredEvent | None:
+        """The open whole `number` as it is once all its parts have ended; None while one has not."""
+        whole = self._index.events[number]
+        interval = span(self._index[part].interval for part in whole.parts)
+        if interval.is_open:
+            return None
+        closed = changed(whole, interval=interval)
+        self._index.replace(closed)
+        return closed
+
+    def _log(self, kind: str, events: Iterable[StoredEvent]) -> None:
+        at = datetime.now(UTC)
+        for event in events:
+            row = InboxRow(n=len(self.log_inbox) + 1, event_id=event.id, kind=kind, agent=event.agent, at=at)
+            self.log_inbox.append(row)

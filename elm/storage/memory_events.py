@@ -1,0 +1,107 @@
+"""How the store in this process makes stored events of given ones: parts first, extents and agent derived."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from datetime import datetime
+from typing import Any
+from uuid import UUID
+
+from elm.errors import CycleRefused, ExtentRefused
+from elm.event import Event, StoredEvent
+from elm.geometry import Region, derived_region, same_extent
+from elm.interval import Interval
+
+
+def parts_first(events: Iterable[Event]) -> list[Event]:
+    """The events level by level, so that the parts among them come earlier; a circle is refused."""
+    waiting = {event.uid: event for event in events}
+    missing = {uid: sum(part in waiting for part in event.parts) for uid, event in waiting.items()}
+    wholes: dict[UUID, list[UUID]] = {}
+    for uid, event in waiting.items():
+        for part in event.parts:
+            wholes.setdefault(part, []).append(uid)
+    rank = {uid: number for number, uid in enumerate(waiting)}
+    found: list[Event] = []
+    ready = [uid for uid, count in missing.items() if count == 0]
+    while ready:
+        found += [waiting.pop(uid) for uid in ready]
+        later = []
+        for part in ready:
+            for whole in wholes.get(part, ()):
+                missing[whole] -= 1
+                if missing[whole] == 0:
+                    later.append(whole)
+        ready = sorted(later, key=rank.__getitem__)
+    if waiting:
+        raise CycleRefused(
+            f"events cannot be parts of each other: {' has part '.join(map(str, _circle(waiting)))}. "
+            f"Remove one of these links"
+        )
+    return found
+
+
+def _circle(events: dict[UUID, Event]) -> list[UUID]:
+    """A circle of links among events each of which has a part among them."""
+    path: dict[UUID, None] = {}
+    uid = next(iter(events))
+    while uid not in path:
+        path[uid] = None
+        uid = next(part for part in events[uid].parts if part in events)
+    ring = [*path]
+    return [*ring[ring.index(uid) :], uid]
+
+
+def as_stored(event: Event, parts: Sequence[StoredEvent], *, number: int, recorded_at: datetime) -> StoredEvent:
+    """The event as a memory keeps it; `parts` are its stored parts, from which its extents derive."""
+    interval, region, subject, agent = event.interval, event.region, event.subject, event.agent
+    if parts:
+        in_uid_order = sorted(parts, key=lambda part: part.uid)
+        interval = span(part.interval for part in parts)
+        if event.interval not in (None, interval):
+            raise ExtentRefused(
+                f"event {event.uid} cannot have the interval {event.interval}: that of its parts is {interval}. "
+                f"Leave the interval out, or commit an instant for the bound and make it a part"
+            )
+        region = _derived(event, "region", event.region, [part.region for part in in_uid_order])
+        subject = _derived(event, "subject", event.subject, [part.subject for part in in_uid_order])
+        agents = {part.agent for part in parts}
+        if agent is None and len(agents) == 1:
+            (agent,) = agents
+    assert interval is not None  # noqa: S101 - an event without parts has one from birth
+    return StoredEvent(
+        id=number,
+        uid=event.uid,
+        type=event.type,
+        interval=interval,
+        recorded_at=recorded_at,
+        region=region,
+        subject=subject,
+        features=event.features,
+        agent=agent,
+        payload=event.payload,
+        parts=event.parts,
+    )
+
+
+def _derived(event: Event, name: str, given: Region | None, parts: list[Region | None]) -> Region | None:
+    derived = derived_region(parts)
+    if given is not None and not same_extent(given, derived):
+        raise ExtentRefused(
+            f"event {event.uid} cannot have the {name} {given!r}: that of its parts is {derived!r}. "
+            f"Leave the {name} out: it derives"
+        )
+    return derived
+
+
+def span(intervals: Iterable[Interval]) -> Interval:
+    """From the first begin to the last end; open when one of them is (Def 7)."""
+    known = list(intervals)
+    ends = [interval.end for interval in known if interval.end is not None]
+    begin = min(interval.begin for interval in known)
+    return Interval(begin=begin, end=max(ends) if len(ends) == len(known) else None)
+
+
+def changed(event: StoredEvent, **fields: Any) -> StoredEvent:
+    """The stored event with some fields of new value."""
+    return StoredEvent(**{name: getattr(event, name) for name in StoredEvent.FIELDS} | fields)

@@ -1,0 +1,462 @@
+"""A memory in PostgreSQL with PostGIS: one schema, every call one transaction, every cue one statement."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from datetime import UTC, datetime, timedelta
+from itertools import islice
+from typing import Any
+from uuid import UUID
+
+import msgspec
+import psycopg
+from sqlalchemy import Select
+
+from elm.cues.algebra import Cue, UidCue
+from elm.cues.codec import cue_to_json
+from elm.errors import ConflictingContent
+from elm.event import StoredEvent
+from elm.exchange import to_line
+from elm.features import identity, kind_of
+from elm.interval import Window
+from elm.storage import batch_loading, event_writing, recall_statements, schema, type_writing
+from elm.storage import write_statements as sql
+from elm.storage.connections import Connection, Connections
+from elm.storage.cue_compiler import CompiledCue, compile_cue
+from elm.storage.encoding import Row
+from elm.storage.names import NameCache
+from elm.storage.rows import FRAME_ID, SUBJECT_FRAME_ID, TYPE_ID, decoders, moment
+from elm.store import (
+    Arrival,
+    BatchReport,
+    ByFeature,
+    Closed,
+    Committed,
+    ConditionRows,
+    Explanation,
+    Group,
+    Grouping,
+    Join,
+    Query,
+    Refusal,
+    Statistics,
+    TypesAdded,
+)
+from elm.taxonomy import EventType
+
+CHUNK = 1_000
+"""Rows that a streamed result holds in this process at a time."""
+_CHUNKED = psycopg.capabilities.has_stream_chunked()
+
+
+class PostgresStore:
+    """The `Store` over one schema of a PostgreSQL database; safe to share between threads."""
+
+    def __init__(self, dsn: str, memory: str) -> None:
+        self.memory = schema.check_memory_name(memory)
+        self._dsn = dsn
+        self._connections = Connections(dsn, memory)
+        self._names = NameCache(self._connections, memory)
+        self._decode = decoders(self._names.types, self._names.frames)
+        self._statements = recall_statements.StatementCache()
+        self._is_ready = False
+
+    # Types
+
+    def add_types(self, types: Sequence[EventType]) -> TypesAdded:
+        """Add types and parents, in any order; cycles and unknown parents refuse the whole call."""
+        self._ready_to_write()
+        with self._connections.writing() as connection:
+            return type_writing.add_types(connection, types)
+
+    def types(self) -> Iterator[EventType]:
+        """All types, parents first."""
+        self._ready_to_recall()
+        with self._connections.recalling() as connection:
+            return type_writing.every_type(connection)
+
+    # Writing
+
+    def commit(self, arrival: Arrival) -> Committed:
+        """Keep one event whose parts are all in the memory."""
+        self._ready_to_write()
+        now = datetime.now(UTC)
+        (row,) = event_writing.encoded([arrival], self._names, now)
+        with self._connections.writing() as connection:
+            done = event_writing.commit(connection, arrival.event, row, now)
+        return done or self._same_or_refused(arrival)
+
+    def commit_all(self, arrivals: Sequence[Arrival]) -> list[Committed]:
+        """Keep all or none; events may be parts of each other in any order."""
+        self._ready_to_write()
+        now = datetime.now(UTC)
+        ordered = event_writing.wholes_last(arrivals)
+        rows = event_writing.encoded(ordered, self._names, now)
+        done: dict[UUID, Committed] = {}
+        with self._connections.writing() as connection, connection.transaction():
+            for arrival, row in zip(ordered, rows, strict=True):
+                event = arrival.event
+                found = event_writing.commit(connection, event, row, now)
+                done[event.uid] = found or self._same_or_refused(arrival, connection)
+        return [done[arrival.event.uid] for arrival in arrivals]
+
+    def _same_or_refused(self, arrival: Arrival, connection: Connection | None = None) -> Committed:
+        """An event that was not taken is the one already stored, as it stands now, or refused."""
+        event = arrival.event
+        if connection is None:
+            with self._connections.writing() as own:
+                return self._same_or_refused(arrival, own)
+        stored = {each.uid: each for each in self._stored(connection, [event.uid, *event.parts])}
+        if event.uid in stored:
+            event_writing.refuse_other(event, stored[event.uid])
+            return Committed(id=stored[event.uid].id, uid=event.uid, new=False)
+        raise event_writing.why_refused(event, stored.values())
+
+    def load(self, arrivals: Sequence[Arrival]) -> BatchReport:
+        """Keep what can be kept of a batch whose parts come before their wholes or are in the memory."""
+        self._ready_to_write()
+        if not arrivals:
+            return BatchReport(new=0, existing=0, refused=())
+        refused, same = batch_loading.repeated(arrivals)
+        types = self._names.known_type_ids({arrival.event.type for arrival in arrivals})
+        for index, arrival in enumerate(arrivals):
+            if arrival.event.type not in types:
+                refused[index] = f"unknown event type {arrival.event.type!r}: add it first (`elm types add`)"
+        kept = [index for index in range(len(arrivals)) if index not in refused and index not in same]
+        now = datetime.now(UTC)
+        encoded = event_writing.encoded([arrivals[index] for index in kept], self._names, now)
+        rows = dict(zip(kept, encoded, strict=True))
+        with self._connections.writing() as connection, connection.transaction():
+            present = self._stage(connection, arrivals, rows, refused)
+            heights = batch_loading.levels([arrival.event for arrival in arrivals])
+            taken = batch_loading.insert(connection, highest=max(heights), now=now)
+            for index in rows.keys() - refused.keys() - present:
+                event = arrivals[index].event
+                if event.uid not in taken:
+                    parts = self._stored(connection, event.parts)
+                    refused[index] = str(event_writing.why_refused(event, parts))
+        lost = {arrivals[index].event.uid for index in refused}
+        doubles = {index for index in same if arrivals[index].event.uid in lost}
+        refused |= dict.fromkeys(doubles, "the same event was refused earlier in this batch")
+        new = sum(not existed for existed in taken.values())
+        reasons = tuple(Refusal(index=index, reason=refused[index]) for index in sorted(refused))
+        return BatchReport(new=new, existing=len(arrivals) - new - len(reasons), refused=reasons)
+
+    def _stage(
+        self,
+        connection: Connection,
+        arrivals: Sequence[Arrival],
+        rows: Mapping[int, Row],
+        refused: dict[int, str],
+    ) -> set[int]:
+        """Stage the rows of a batch, less those that are in the memory (returned) and those that cannot be kept."""
+        heights = batch_loading.levels([arrival.event for arrival in arrivals])
+        batch_loading.stage(connection, rows, heights)
+        found = batch_loading.existing(connection)
+        present = {index for index, _, _ in found}
+        for index, _, same in found:
+            event = arrivals[index].event
+            if not same:
+                try:
+                    event_writing.refuse_other(event, next(iter(self._stored(connection, [event.uid]))))
+                except ConflictingContent as error:
+                    refused[index] = str(error)
+        later = {index: parts for index, parts in batch_loading.parts_to_come(arrivals).items() if index in rows}
+        kept = {each.uid for each in self._stored(connection, [uid for parts in later.values() for uid in parts])}
+        for index, parts in later.items():
+            if index not in present and (missing := parts - kept):
+                named = ", ".join(sorted(map(str, missing))[:5])
+                refused[index] = f"its parts {named} stand later in the load: move the whole behind them"
+        batch_loading.drop(connection, sorted(present | (rows.keys() & refused.keys())))
+        return present
+
+    def finish_load(self) -> None:
+        """Bring the planner's statistics up to date."""
+        self._ready_to_write()
+        with self._connections.writing() as connection:
+            connection.execute(sql.ANALYZE)
+
+    def close_event(self, uid: UUID, end: datetime) -> Closed:
+        """End an open event and recompute the extents of all its wholes; the same end again changes nothing."""
+        self._ready_to_write()
+        with self._connections.writing() as connection:
+            with connection.transaction():
+                closed = event_writing.close(connection, uid, end)
+            if closed is not None:
+                return closed
+            return event_writing.why_not_closed(uid, end, next(iter(self._stored(connection, [uid])), None))
+
+    # Recalling
+
+    def find(self, query: Query) -> Iterator[StoredEvent]:
+        """The events a query asks for, streamed from one consistent view."""
+        text, values = self._asked("find", query, recall_statements.find)
+        limited = query.limit is not None and query.limit <= CHUNK
+        return self._events(text, values, at_once=limited)
+
+    def ids(self, query: Query) -> Iterator[int]:
+        """Their ids alone."""
+        text, values = self._asked("ids", query, recall_statements.find_ids)
+        with self._connections.recalling() as connection:
+            for row in self._stream(connection, text, values):
+                yield row[0]
+
+    def count(self, cue: Cue) -> int:
+        """How many events match."""
+        compiled = self._compiled(cue)
+        text = self._statements.text(("count", compiled.key), lambda: recall_statements.count(compiled))
+        return int(self._one(text, compiled.values)[0])
+
+    def exists(self, cue: Cue) -> bool:
+        """Whether any event matches."""
+        compiled = self._compiled(cue)
+        text = self._statements.text(("exists", compiled.key), lambda: recall_statements.any_match(compiled))
+        return bool(self._all(text, compiled.values))
+
+    def get(self, ids: Sequence[int]) -> list[StoredEvent]:
+        """The events with these ids, in id order; unknown ids are left out."""
+        self._ready_to_recall()
+        text = self._statements.text("by id", recall_statements.by_ids)
+        return list(self._events(text, {"ids": list(ids)}, at_once=True))
+
+    def groups(self, cue: Cue, by: Grouping | ByFeature) -> list[Group]:
+        """The matching events by key, keys in ascending order, None last."""
+        compiled = self._compiled(cue)
+        key = ("groups", compiled.key, by if isinstance(by, Grouping) else "feature")
+        text = self._statements.text(key, lambda: recall_statements.groups(compiled, by))
+        values = compiled.values if isinstance(by, Grouping) else {**compiled.values, "feature_name": by.name}
+        with self._connections.recalling() as connection:
+            rows = connection.execute(text, values, binary=True).fetchall()
+            if by is Grouping.TYPE:
+                self._names.learn(connection, [row[0] for row in rows], [])
+            if by is Grouping.FRAME:
+                self._names.learn(connection, [], [row[0] for row in rows])
+        return _merged(rows, by, self._names)
+
+    def join(self, join: Join) -> Iterator[tuple[StoredEvent, StoredEvent | None]]:
+        """Each anchor, in order, with the neighbour found for it."""
+        anchors, other = self._compiled(join.anchors.cue), self._compiled(join.cue, prefix="n")
+        pinned, near = _hints(join.anchors)
+        shape = recall_statements.shape(join.anchors, pinned=pinned, near=near)
+        key = ("join", anchors.key, other.key, join.relation, join.same_region, shape)
+        text = self._statements.text(
+            key, lambda: recall_statements.join(anchors, other, join, pinned=pinned, near=near)
+        )
+        own = recall_statements.parameters(join.anchors, near=near)
+        with self._connections.recalling() as connection:
+            pairs = self._stream(connection, text, {**anchors.values, **other.values, **own})
+            while chunk := list(islice(pairs, CHUNK)):
+                wanted = {number for pair in chunk for number in pair if number is not None}
+                known = {event.id: event for event in self.get(sorted(wanted))}
+                for anchor, neighbour in chunk:
+                    yield known[anchor], known[neighbour] if neighbour is not None else None
+
+    def explain(self, query: Query) -> Explanation:
+        """How the query is answered; it is run for that."""
+        text, values = self._asked("find", query, recall_statements.find)
+        parts = recall_statements.conditions_of(query.cue)
+        compiled = [self._compiled(part, prefix=f"c{index}_") for index, part in enumerate(parts)]
+        removed = str(recall_statements.removed(compiled).compile(dialect=recall_statements.DIALECT))
+        with self._connections.recalling() as connection:
+            plan = connection.execute(f"EXPLAIN (ANALYZE, BUFFERS) {text}", values).fetchall()
+            given = {name: value for each in compiled for name, value in each.values.items()}
+            counts = connection.execute(removed, given).fetchone()
+        assert counts is not None  # noqa: S101 - a count always has a row
+        return Explanation(
+            sql=text,
+            parameters=values,
+            plan="\n".join(line for (line,) in plan),
+            events=counts[0],
+            conditions=tuple(
+                ConditionRows(
+                    condition=to_line(cue_to_json(part)), alone=counts[1 + 2 * index], left=counts[2 + 2 * index]
+                )
+                for index, part in enumerate(parts)
+            ),
+        )
+
+    def arrow(self, query: Query) -> Any:
+        """The events as a pyarrow.RecordBatchReader in the schema of `elm.columns`."""
+
+        from elm.columns import reader_of
+        from elm.storage import arrow_rows
+
+        text, values = self._asked("find", query, recall_statements.find)
+
+        def batches() -> Iterator[Any]:
+            with self._connections.recalling() as connection:
+                rows = self._stream(connection, text, values)
+                yield from arrow_rows.batches(rows, self._learn, self._names.types, self._names.frames)
+
+        return reader_of(batches())
+
+    def statistics(self) -> Statistics:
+        """What the memory holds, in numbers."""
+        self._ready_to_recall()
+        row = self._one(recall_statements.STATISTICS, {"memory": self.memory})
+        times = [None if raw is None else moment(raw) for raw in row[7:10]]
+        return Statistics(
+            events=row[0],
+            complex_events=row[1],
+            open_events=row[2],
+            links=row[3],
+            types=row[4],
+            frames=row[5],
+            agents=row[6],
+            first_begin=times[0],
+            last_begin=times[1],
+            last_recorded_at=times[2],
+            bytes=int(row[10]),
+        )
+
+    def close(self) -> None:
+        """Let go of connections; further calls are refused."""
+        self._connections.close()
+
+    # How statements are run
+
+    def _asked(self, kind: str, query: Query, build: Callable[..., Select[Any]]) -> tuple[str, dict[str, Any]]:
+        compiled = self._compiled(query.cue)
+        pinned, near = _hints(query)
+        key = (kind, compiled.key, recall_statements.shape(query, pinned=pinned, near=near))
+        text = self._statements.text(key, lambda: build(compiled, query, pinned=pinned, near=near))
+        return text, {**compiled.values, **recall_statements.parameters(query, near=near)}
+
+    def _compiled(self, cue: Cue, *, prefix: str = "p") -> CompiledCue:
+        self._ready_to_recall()
+        return compile_cue(cue, self._names, prefix=prefix)
+
+    def _events(self, text: str, values: dict[str, Any], *, at_once: bool) -> Iterator[StoredEvent]:
+        with self._connections.recalling() as connection:
+            if at_once:
+                rows = connection.execute(text, values, binary=True).fetchall()
+                self._learn(rows, connection)
+            else:
+                yield from self._streamed_events(connection, text, values)
+                return
+        decode = self._decode
+        for row in rows:
+            yield StoredEvent.of_row(row, decode)
+
+    def _streamed_events(self, connection: Connection, text: str, values: dict[str, Any]) -> Iterator[StoredEvent]:
+        stream = self._stream(connection, text, values)
+        decode = self._decode
+        while chunk := list(islice(stream, CHUNK)):
+            self._learn(chunk)
+            for row in chunk:
+                yield StoredEvent.of_row(row, decode)
+
+    def _learn(self, rows: Sequence[Sequence[Any]], connection: Connection | None = None) -> None:
+        """Have the names at hand that these rows mention by number."""
+        types = {row[TYPE_ID] for row in rows} - self._names.types.keys()
+        frames = ({row[FRAME_ID] for row in rows} | {row[SUBJECT_FRAME_ID] for row in rows}) - {None}
+        if not types and frames <= self._names.frames.keys():
+            return
+        if connection is not None:
+            self._names.learn(connection, types, frames)
+            return
+        # The connection that streams is busy.
+        with self._connections.recalling() as other:
+            self._names.learn(other, types, frames)
+
+    def _stream(self, connection: Connection, text: str, values: dict[str, Any]) -> Iterator[Sequence[Any]]:
+        size = CHUNK if _CHUNKED else 1
+        return connection.cursor().stream(text, values, binary=True, size=size)
+
+    def _all(self, text: str, values: dict[str, Any]) -> list[Any]:
+        with self._connections.recalling() as connection:
+            return connection.execute(text, values, binary=True).fetchall()
+
+    def _one(self, text: str, values: dict[str, Any]) -> Any:
+        return self._all(text, values)[0]
+
+    def _stored(self, connection: Connection, uids: Sequence[UUID]) -> Iterator[StoredEvent]:
+        """The events with these uids, as the given connection's transaction sees them."""
+        if not uids:
+            return
+        compiled = self._compiled(UidCue(uids=tuple(uids)))
+        query = Query(cue=UidCue(uids=tuple(uids)))
+        text = self._statements.text(
+            ("find", compiled.key, recall_statements.shape(query, pinned=True, near=Window())),
+            lambda: recall_statements.find(compiled, query, pinned=True, near=Window()),
+        )
+        rows = connection.execute(text, compiled.values, binary=True).fetchall()
+        self._learn(rows)
+        for row in rows:
+            yield StoredEvent.of_row(row, self._decode)
+
+    def _ready_to_recall(self) -> None:
+        if not self._is_ready:
+            with self._connections.recalling() as connection:
+                schema.require(connection, self.memory)
+            self._is_ready = True
+
+    def _ready_to_write(self) -> None:
+        if not self._is_ready:
+            with self._connections.writing() as connection:
+                revision = schema.revision_of(connection, self.memory)
+            if revision is None:
+                # Imported here: most commands never create a memory, and alembic takes its time to load.
+                from elm.storage.migrations import migrate
+
+                migrate(self._dsn, self.memory)
+            else:
+                schema.check_revision(revision, self.memory)
+            self._is_ready = True
+
+
+def _hints(query: Query) -> tuple[bool, Window]:
+    return recall_statements.is_pinned(query.cue), recall_statements.begins_within(query.cue)
+
+
+def _merged(rows: Sequence[Sequence[Any]], by: Grouping | ByFeature, names: NameCache) -> list[Group]:
+    """The groups of the rows of `recall_statements.groups`, sorted; values that are one number are one key."""
+    groups: dict[Any, Group] = {}
+    for *raw, number, micros, first, last, is_open in rows:
+        key = _key(raw, by, names)
+        shown = key if key is None or not isinstance(by, ByFeature) else identity(("", key))
+        group = Group(
+            key=key,
+            count=number,
+            duration=timedelta(microseconds=micros),
+            first_begin=moment(first),
+            last_end=None if is_open else moment(last),
+        )
+        known = groups.get(shown)
+        groups[shown] = group if known is None else _together(known, group)
+    return sorted(groups.values(), key=lambda group: _place(group.key))
+
+
+def _key(raw: Sequence[Any], by: Grouping | ByFeature, names: NameCache) -> Any:
+    if any(part is None for part in raw):
+        return None
+    match by:
+        case Grouping.TYPE:
+            return names.types[raw[0]]
+        case Grouping.FRAME:
+            return names.frames[raw[0]]
+        case Grouping.AGENT:
+            return raw[0]
+        case Grouping.DAY | Grouping.HOUR:
+            return moment(raw[0])
+        case ByFeature():
+            kind, text = raw
+            return text if kind == "string" else msgspec.json.decode(text)
+
+
+def _together(one: Group, other: Group) -> Group:
+    ends = (one.last_end, other.last_end)
+    return Group(
+        key=one.key,
+        count=one.count + other.count,
+        duration=one.duration + other.duration,
+        first_begin=min(one.first_begin, other.first_begin),
+        last_end=None if None in ends else max(end for end in ends if end is not None),
+    )
+
+
+def _place(key: Any) -> tuple[bool, str, Any]:
+    """Where a key stands: None last; of feature values bools before numbers before strings."""
+    if key is None:
+        return True, "", 0
+    return False, "" if isinstance(key, datetime) else kind_of(key), key

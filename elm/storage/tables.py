@@ -1,0 +1,167 @@
+"""The tables of one memory: columns, constraints and indexes, as the cue compiler and the migrations know them."""
+
+from __future__ import annotations
+
+from geoalchemy2 import Geometry
+from sqlalchemy import (
+    ARRAY,
+    TIMESTAMP,
+    BigInteger,
+    CheckConstraint,
+    Column,
+    ForeignKey,
+    Identity,
+    Index,
+    Integer,
+    LargeBinary,
+    MetaData,
+    PrimaryKeyConstraint,
+    SmallInteger,
+    Table,
+    Text,
+    Uuid,
+    func,
+)
+from sqlalchemy.dialects.postgresql import JSON, TSTZRANGE
+
+REVISION = "0001"
+"""The migration that makes the tables as they stand here."""
+
+metadata = MetaData(
+    naming_convention={
+        "pk": "%(table_name)s_pkey",
+        "fk": "%(table_name)s_%(column_0_name)s_fkey",
+        "uq": "%(table_name)s_%(column_0_name)s_key",
+        "ck": "%(table_name)s_%(constraint_name)s_check",
+        "ix": "%(table_name)s_%(column_0_N_name)s_idx",
+    }
+)
+
+
+def _c_text() -> Text:
+    # Code point order, whatever the database's locale: the order in which Python compares text.
+    return Text(collation="C")
+
+
+def _polygon() -> Geometry:
+    return Geometry("POLYGON", srid=0, spatial_index=False)
+
+
+event_type = Table(
+    "event_type",
+    metadata,
+    Column("id", Integer, Identity(always=True), primary_key=True),
+    Column("name", _c_text(), nullable=False, unique=True),
+)
+
+type_parent = Table(
+    "type_parent",
+    metadata,
+    Column("child_id", ForeignKey("event_type.id"), primary_key=True),
+    Column("parent_id", ForeignKey("event_type.id"), primary_key=True),
+    CheckConstraint("child_id <> parent_id", name="not_own_parent"),
+)
+
+# Derived from type_parent in the same transaction, hence without foreign keys of its own.
+type_closure = Table(
+    "type_closure",
+    metadata,
+    Column("ancestor_id", Integer, primary_key=True),
+    Column("descendant_id", Integer, primary_key=True),
+    Index("type_closure_descendant_id_idx", "descendant_id"),
+)
+
+frame = Table(
+    "frame",
+    metadata,
+    Column("id", Integer, Identity(always=True), primary_key=True),
+    Column("name", _c_text(), nullable=False, unique=True),
+)
+
+event = Table(
+    "event",
+    metadata,
+    Column("id", BigInteger, Identity(always=True), primary_key=True),
+    Column("uid", Uuid, nullable=False, unique=True),
+    # Types and frames are only ever added, so their numbers need no foreign keys: checking three of them cost
+    # a quarter of an insert and had all writers lock the same few rows (docs/adr/0003).
+    Column("type_id", Integer, nullable=False),
+    Column("period", TSTZRANGE, nullable=False),
+    Column("frame_id", Integer),
+    Column("region", _polygon()),
+    Column("subject_frame_id", Integer),
+    Column("subject", _polygon()),
+    Column("feature_tokens", ARRAY(_c_text()), nullable=False),
+    Column("feature_names", ARRAY(_c_text()), nullable=False),
+    # json, not jsonb: it keeps 1.0 and 1 apart, as they were given.
+    Column("features", JSON, nullable=False),
+    Column("agent", _c_text()),
+    Column("media_type", _c_text()),
+    Column("payload", LargeBinary),
+    # The parts' uids in order stand here too: reading an event needs no join, and they never change.
+    Column("parts", ARRAY(Uuid), nullable=False),
+    Column("recorded_at", TIMESTAMP(timezone=True), nullable=False),
+    Column("content", LargeBinary, nullable=False),
+    # One constraint instead of four: each costs 4 us an insert to set up.
+    CheckConstraint(
+        "lower_inc(period) AND (upper_inc(period) OR upper_inf(period)) AND NOT lower_inf(period)"
+        " AND (region IS NULL) = (frame_id IS NULL) AND (subject IS NULL) = (subject_frame_id IS NULL)"
+        " AND (payload IS NULL) = (media_type IS NULL)",
+        name="whole",
+    ),
+)
+
+begin = func.lower(event.c.period)
+
+Index("event_begin_id_idx", begin, event.c.id)
+Index("event_type_id_begin_id_idx", event.c.type_id, begin, event.c.id)
+Index("event_period_idx", event.c.period, postgresql_using="gist")
+# Frames overlap around their origins: without the frame as first column a region finds all of them.
+Index("event_region_idx", event.c.frame_id, event.c.region, postgresql_using="gist")
+Index(
+    "event_subject_idx",
+    event.c.subject_frame_id,
+    event.c.subject,
+    postgresql_using="gist",
+    postgresql_where=event.c.subject.is_not(None),
+)
+# A short pending list: with the default of 4 MB single inserts stall for 200 ms and recalls read all of it.
+for _name in ("feature_tokens", "feature_names"):
+    Index(
+        f"event_{_name}_idx",
+        event.c[_name],
+        postgresql_using="gin",
+        postgresql_with={"gin_pending_list_limit": 64},
+    )
+# A hash index would be quadratic where payloads repeat; the digest also fits where a payload does not.
+Index("event_payload_idx", func.sha256(event.c.payload), postgresql_where=event.c.payload.is_not(None))
+Index("event_agent_begin_id_idx", event.c.agent, begin, event.c.id, postgresql_where=event.c.agent.is_not(None))
+Index("event_recorded_at_id_idx", event.c.recorded_at, event.c.id)
+
+part = Table(
+    "part",
+    metadata,
+    Column("whole_id", ForeignKey("event.id"), nullable=False),
+    Column("part_id", ForeignKey("event.id"), nullable=False),
+    Column("ordinal", Integer, nullable=False),
+    Column("whole_uid", Uuid, nullable=False),
+    PrimaryKeyConstraint("whole_id", "part_id"),
+    CheckConstraint("part_id < whole_id", name="part_before_whole"),
+    Index("part_part_id_idx", "part_id", "whole_id", postgresql_include=["whole_uid"]),
+)
+
+log_inbox = Table(
+    "log_inbox",
+    metadata,
+    Column("n", BigInteger, Identity(always=True), primary_key=True),
+    Column("event_id", BigInteger),
+    Column("kind", SmallInteger, nullable=False),
+    Column("agent", _c_text()),
+    Column("deadline", TIMESTAMP(timezone=True)),
+    Column("at", TIMESTAMP(timezone=True), nullable=False),
+)
+
+LOG_COMMIT = 1
+"""`log_inbox.kind` of an event that was committed."""
+LOG_CLOSE = 2
+"""`log_inbox.kind` of an open event that was closed, or of a whole that thereby closed."""

@@ -1,0 +1,184 @@
+"""The statements that write: each commits one event, or one level of a batch, with its links and log entries."""
+
+from __future__ import annotations
+
+from elm.storage.encoding import COLUMNS
+from elm.storage.tables import LOG_CLOSE, LOG_COMMIT
+
+# What derives from the parts (Defs 7 and 10). The corners are collected, not the areas united: a union
+# would change the hull's last digits. In uid order, so that every store finds the same ones.
+_EXTENT = """
+    range_merge(range_agg(p.period)) AS period,
+    CASE WHEN count(DISTINCT p.frame_id) = 1 THEN min(p.frame_id) END AS frame_id,
+    CASE WHEN count(DISTINCT p.frame_id) = 1 THEN ST_ConvexHull(ST_Collect(p.region ORDER BY p.uid)) END AS region,
+    CASE WHEN count(DISTINCT p.subject_frame_id) = 1 THEN min(p.subject_frame_id) END AS subject_frame_id,
+    CASE WHEN count(DISTINCT p.subject_frame_id) = 1
+         THEN ST_ConvexHull(ST_Collect(p.subject ORDER BY p.uid)) END AS subject,
+    CASE WHEN count(p.agent) = count(*) AND min(p.agent) = max(p.agent) THEN min(p.agent) END AS agent
+"""
+
+
+# That extents given for a complex event are those that derive, as `geometry.same_extent` says.
+_AGREES = """
+    (<given>period IS NULL OR <given>period = x.period)
+    AND (<given>frame_id IS NULL OR (<given>frame_id = x.frame_id
+         AND ST_HausdorffDistance(<given>region, x.region) <= 1e-6) IS TRUE)
+    AND (<given>subject_frame_id IS NULL OR (<given>subject_frame_id = x.subject_frame_id
+         AND ST_HausdorffDistance(<given>subject, x.subject) <= 1e-6) IS TRUE)
+"""
+
+
+def _filled(statement: str) -> str:
+    """`statement` with the pieces that several share put in: all of them constants of this module."""
+    return (
+        statement.replace("<columns>", ", ".join(COLUMNS))
+        .replace("<extent>", _EXTENT)
+        .replace("<agrees g.>", _AGREES.replace("<given>", "g."))
+        .replace("<agrees s.>", _AGREES.replace("<given>", "s."))
+        .replace("<commit>", str(LOG_COMMIT))
+        .replace("<close>", str(LOG_CLOSE))
+    )
+
+
+# Parameters $1 to $16 are `encoding.COLUMNS` in their order, $17 the time of writing.
+
+# An event in one round trip. A uid that is taken comes back only where the content is the same: the
+# update changes nothing, but unlike DO NOTHING it returns the row, also of a transaction just finished.
+COMMIT_ATOMIC = _filled("""
+WITH new AS (
+    INSERT INTO event (<columns>)
+    VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, $13, $14, $15, $16)
+    ON CONFLICT (uid) DO UPDATE SET uid = excluded.uid WHERE event.content = excluded.content
+    RETURNING id, xmax <> 0 AS existed
+), logged AS (
+    INSERT INTO log_inbox (event_id, kind, agent, at) SELECT id, <commit>, $11, $17 FROM new WHERE NOT existed
+)
+SELECT id, existed FROM new
+""")
+
+# A complex event in one round trip. FOR SHARE waits for a part that is just being closed and then reads
+# its end; without it two parts closed meanwhile would leave the whole open for ever. In id order, as
+# close locks too, so that the two never wait for each other.
+COMMIT_COMPLEX = _filled("""
+WITH g AS (
+    SELECT $3::tstzrange AS period, $4::integer AS frame_id, $5::geometry AS region,
+           $6::integer AS subject_frame_id, $7::geometry AS subject
+), p AS MATERIALIZED (
+    SELECT id, uid, period, frame_id, region, subject_frame_id, subject, agent
+    FROM event WHERE uid = ANY($14::uuid[]) ORDER BY id FOR SHARE
+), x AS (
+    SELECT count(*) AS found, <extent> FROM p
+), new AS (
+    INSERT INTO event (<columns>)
+    SELECT $1, $2, x.period, x.frame_id, x.region, x.subject_frame_id, x.subject, $8, $9, $10,
+           coalesce($11, x.agent), $12, $13, $14, $15, $16
+    FROM x, g
+    WHERE x.found = cardinality($14) AND <agrees g.>
+    ON CONFLICT (uid) DO UPDATE SET uid = excluded.uid WHERE event.content = excluded.content
+    RETURNING id, uid, agent, xmax <> 0 AS existed
+), linked AS (
+    INSERT INTO part (whole_id, part_id, ordinal, whole_uid)
+    SELECT new.id, p.id, asked.ordinal, new.uid
+    FROM new, unnest($14) WITH ORDINALITY AS asked (uid, ordinal) JOIN p USING (uid)
+    WHERE NOT existed
+), logged AS (
+    INSERT INTO log_inbox (event_id, kind, agent, at) SELECT id, <commit>, agent, $17 FROM new WHERE NOT existed
+)
+SELECT id, existed FROM new
+""")
+
+# Loading: a batch is copied into a temporary table and goes from there into the memory, level by level,
+# for a statement does not see the rows it inserts itself.
+
+CREATE_STAGING = """
+CREATE TEMPORARY TABLE IF NOT EXISTS staging (
+    row integer NOT NULL, level integer NOT NULL, uid uuid, type_id integer, period tstzrange, frame_id integer,
+    region geometry, subject_frame_id integer, subject geometry, feature_tokens text[], feature_names text[],
+    features json, agent text, media_type text, payload bytea, parts uuid[], recorded_at timestamptz, content bytea
+) ON COMMIT DELETE ROWS
+"""
+
+COPY_STAGING = "COPY staging FROM STDIN (FORMAT BINARY)"
+
+STAGED_EXISTING = """
+SELECT s.row, e.id, e.content = s.content AS same FROM staging s JOIN event e USING (uid)
+"""
+
+DROP_STAGED = "DELETE FROM staging WHERE row = ANY(%(rows)s)"
+
+LOAD_ATOMIC = _filled("""
+WITH new AS (
+    INSERT INTO event (<columns>)
+    SELECT <columns> FROM staging WHERE level = 0 ORDER BY row
+    ON CONFLICT (uid) DO UPDATE SET uid = excluded.uid WHERE event.content = excluded.content
+    RETURNING id, uid, agent, xmax <> 0 AS existed
+), logged AS (
+    INSERT INTO log_inbox (event_id, kind, agent, at)
+    SELECT id, <commit>, agent, %(now)s FROM new WHERE NOT existed ORDER BY id
+)
+SELECT uid, existed FROM new
+""")
+
+LOCK_OPEN_PARTS = """
+SELECT id FROM event
+WHERE uid IN (SELECT unnest(parts) FROM staging WHERE level > 0) AND upper_inf(period)
+ORDER BY id FOR SHARE
+"""
+
+LOAD_LEVEL = _filled("""
+WITH p AS MATERIALIZED (
+    SELECT s.row, asked.ordinal, e.id, e.uid, e.period, e.frame_id, e.region, e.subject_frame_id, e.subject, e.agent
+    FROM staging s, unnest(s.parts) WITH ORDINALITY AS asked (uid, ordinal) JOIN event e ON e.uid = asked.uid
+    WHERE s.level = %(level)s
+), x AS (
+    SELECT p.row, count(*) AS found, <extent> FROM p GROUP BY p.row
+), new AS (
+    INSERT INTO event (<columns>)
+    SELECT s.uid, s.type_id, x.period, x.frame_id, x.region, x.subject_frame_id, x.subject, s.feature_tokens,
+           s.feature_names, s.features, coalesce(s.agent, x.agent), s.media_type, s.payload, s.parts,
+           s.recorded_at, s.content
+    FROM staging s JOIN x ON x.row = s.row
+    WHERE s.level = %(level)s AND x.found = cardinality(s.parts) AND <agrees s.>
+    ORDER BY s.row
+    ON CONFLICT (uid) DO UPDATE SET uid = excluded.uid WHERE event.content = excluded.content
+    RETURNING id, uid, agent, xmax <> 0 AS existed
+), linked AS (
+    INSERT INTO part (whole_id, part_id, ordinal, whole_uid)
+    SELECT new.id, p.id, p.ordinal, new.uid
+    FROM new JOIN staging s ON s.uid = new.uid JOIN p ON p.row = s.row
+    WHERE NOT new.existed
+), logged AS (
+    INSERT INTO log_inbox (event_id, kind, agent, at)
+    SELECT id, <commit>, agent, %(now)s FROM new WHERE NOT existed ORDER BY id
+)
+SELECT uid, existed FROM new
+""")
+
+ANALYZE = "ANALYZE event, part, event_type, type_closure"
+
+# Closing: the event first; then, in later statements that see what others committed meanwhile, its
+# wholes, locked in id order and recomputed in that order, for parts have smaller ids than their wholes.
+
+CLOSE_EVENT = """
+UPDATE event SET period = tstzrange(lower(period), %(end)s, '[]')
+WHERE uid = %(uid)s AND upper_inf(period) AND parts = '{}' AND lower(period) <= %(end)s
+RETURNING id, agent
+"""
+
+LOCK_WHOLES = """
+WITH RECURSIVE above AS (
+    SELECT whole_id FROM part WHERE part_id = %(id)s
+    UNION SELECT part.whole_id FROM part JOIN above ON part.part_id = above.whole_id
+)
+SELECT id, uid, upper_inf(period) AS was_open FROM event WHERE id IN (SELECT whole_id FROM above)
+ORDER BY id FOR UPDATE
+"""
+
+RECOMPUTE_WHOLE = """
+UPDATE event SET period = (
+    SELECT range_merge(range_agg(p.period)) FROM part l JOIN event p ON p.id = l.part_id WHERE l.whole_id = event.id
+)
+WHERE id = %(id)s RETURNING upper_inf(period), agent
+"""
+
+LOG_CLOSED = _filled("INSERT INTO log_inbox (event_id, kind, agent, at) VALUES (%(id)s, <close>, %(agent)s, %(now)s)")

@@ -1,0 +1,42 @@
+"""What text may be kept: the checks that names and values share, so that every store can hold what is accepted."""
+
+from __future__ import annotations
+
+from elm.errors import InvalidValue
+
+NAME_BYTES = 500
+"""Longest name of a type, frame or agent, in bytes of UTF-8: an index entry holds it whole."""
+
+
+def check_text(value: str, *, what: str) -> str:
+    """`value`, when every store can keep it: no NUL, no half of a surrogate pair."""
+    if not isinstance(value, str):
+        raise InvalidValue(f"{what} must be text, not {type(value).__name__}: {value!r}")
+    if "\x00" in value:
+        raise InvalidValue(f"{what} contains a NUL character: {value[:60]!r}. Remove it")
+    if not value.isascii():
+        try:
+            value.encode()
+        except UnicodeEncodeError as error:
+            raise InvalidValue(
+                f"{what} contains half of a surrogate pair, which is no character: {value[:60]!r}"
+            ) from error
+    return value
+
+
+def check_name(value: str, *, what: str) -> str:
+    """`value`, when it can name a type, frame, agent or feature: not empty, no control separator."""
+    check_text(value, what=what)
+    if not value:
+        raise InvalidValue(f"{what} is empty: give it a name")
+    if "\x1f" in value:
+        raise InvalidValue(f"{what} contains the control character U+001F: {value[:60]!r}. Remove it")
+    return value
+
+
+def check_short_name(value: str, *, what: str) -> str:
+    """`value`, when it is a name of at most `NAME_BYTES` bytes of UTF-8."""
+    check_name(value, what=what)
+    if len(value) > NAME_BYTES or (not value.isascii() and len(value.encode()) > NAME_BYTES):
+        raise InvalidValue(f"{what} is longer than {NAME_BYTES} bytes: {value[:60]!r}... Shorten it")
+    return value

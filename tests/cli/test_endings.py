@@ -1,0 +1,148 @@
+"""How commands end: exit codes, one line for an error, and quietly when somebody has heard enough."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+
+from tests.cli.conftest import Program
+
+NOBODY_THERE = "postgresql://robot:geheim@127.0.0.1:1/elm"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code"),
+    [
+        (("count",), 0),
+        (("export",), 0),
+        (("count", "--agent", "nobody"), 0),
+        (("export", "--agent", "nobody"), 0),
+        (("--version",), 0),
+        (("recall", "--help"), 0),
+        (("recall", "--is-a", "Unheard-of"), 1),
+        (("tree", "999999"), 1),
+        (("types", "tree", "Unheard-of"), 1),
+        (("count", "--memory", "never-made"), 1),
+        (("rekall",), 2),
+        (("recall", "--colour", "red"), 2),
+        (("recall", "--limit", "0"), 2),
+        (("recall", "--order", "size"), 2),
+        (("recall", "--after", "yesterday"), 2),
+        (("recall", "--since", "2026-01-01T10:00:00"), 2),
+        (("recall", "--since", "2026-01-02T10:00:00Z", "--until", "2026-01-01T10:00:00Z"), 2),
+        (("recall", "--near", "1,2"), 2),
+        (("recall", "--near", "nan,0,1"), 2),
+        (("recall", "--feature", "cup"), 2),
+        (("recall", "--cue", "no-such-file"), 2),
+        (("recall", "--cue", '{"op": "tipe"}'), 2),
+        (("recall", "--cue", '{"op": '), 2),
+        (("recall", "-o", "parquet"), 2),
+        (("count", "--by", "colour"), 2),
+        (("show", "cup"), 2),
+        (("load", "no-such-file"), 2),
+        (("types", "load"), 2),
+        (("recall", "--agent", "nobody"), 4),
+        (("show", "999999"), 4),
+        (("show", "00000000-0000-4000-8000-00000000ffff"), 4),
+    ],
+)
+def test_exit_codes(filled: Program, arguments: tuple[str, ...], code: int) -> None:
+    done = filled.here(*arguments)
+    assert done.returncode == code, done.stderr
+    assert "Traceback" not in done.stderr
+    if code == 1:
+        assert done.stderr.startswith("elm: ")
+        assert len(done.stderr.splitlines()) == 1
+
+
+def test_an_unreachable_database_is_code_3_and_keeps_its_password(filled: Program) -> None:
+    done = filled("recall", "--dsn", NOBODY_THERE)
+    assert done.returncode == 3
+    assert done.stderr.startswith("elm: ")
+    assert len(done.stderr.splitlines()) == 1
+    assert "geheim" not in done.stderr + done.stdout
+
+
+def test_debug_shows_the_trace_before_the_message(filled: Program) -> None:
+    done = filled("--debug", "recall", "--is-a", "Unheard-of")
+    assert done.returncode == 1
+    assert done.stderr.startswith("Traceback")
+    assert done.stderr.splitlines()[-1].startswith("elm: ")
+    assert filled.having(ELM_DEBUG="1")("tree", "999999").stderr.startswith("Traceback")
+
+
+def test_a_reader_that_goes_away_ends_a_recall_quietly(filled: Program) -> None:
+    read, write = os.pipe()
+    os.close(read)
+    try:
+        for form in ("jsonl", "csv", "geojson", "table"):
+            process = filled.start("recall", "-o", form, stdout=write, stderr=subprocess.PIPE)
+            _, remarks = process.communicate(timeout=60)
+            assert (process.returncode, remarks) == (141, b""), form
+    finally:
+        os.close(write)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
+def test_a_full_disk_is_an_error(filled: Program) -> None:
+    with open("/dev/full", "wb") as full:
+        process = filled.start("recall", stdout=full.fileno(), stderr=subprocess.PIPE)
+        _, remarks = process.communicate(timeout=60)
+    assert (process.returncode, remarks.decode()) == (1, "elm: No space left on device\n")
+
+
+def test_control_c_ends_a_load_without_a_trace(program: Program) -> None:
+    assert program.here("types", "add", "Drive").returncode == 0
+    process = program.start("load", "-", stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    refused = program.directory / "stdin.refused.jsonl"
+    deadline = time.monotonic() + 60
+    # The file for refused lines is made just before the first line is waited for.
+    while not refused.exists():
+        assert time.monotonic() < deadline
+        assert process.poll() is None
+        time.sleep(0.02)
+    process.send_signal(signal.SIGINT)
+    answer, remarks = process.communicate(timeout=60)
+    assert (process.returncode, answer, remarks) == (130, b"", b"")
+    assert not refused.exists()
+
+
+def test_doctor_works_when_things_are_broken_and_keeps_secrets(program: Program, tmp_path: Path) -> None:
+    broken = program.having(ELM_DSN=NOBODY_THERE, PGPASSWORD="geheim", ELM_HOME="/proc/nowhere")
+    done = broken("doctor")
+    assert done.returncode == 0
+    assert "geheim" not in done.stdout + done.stderr
+    assert "Traceback" not in done.stdout + done.stderr
+    found = dict(line.split(": ", 1) for line in done.stdout.splitlines())
+    assert found["ELM_DSN"] == "user=robot password=*** dbname=elm host=127.0.0.1 port=1"
+    assert found["PGPASSWORD"] == "set (not shown)"
+    assert found["Python"].startswith("CPython 3.")
+    assert {"elm", "system", "GEOS", "libpq", "ELM_HOME"} <= set(found)
+    assert found["connection"].startswith("FAILED: no database at 127.0.0.1")
+
+
+def test_doctor_tells_of_a_memory_that_is_well(filled: Program) -> None:
+    done = filled("doctor")
+    assert (done.returncode, done.stderr) == (0, "")
+    for word in ("PostgreSQL", "postgis", filled.settings["ELM_MEMORY"], "not running"):
+        assert word in done.stdout
+
+
+def test_up_and_down_say_what_they_did(home: Path, tmp_path: Path) -> None:
+    elm = Program(directory=tmp_path, settings={"ELM_HOME": str(home)})
+    assert "was not running" in elm("down").stderr
+    up = elm.having(ELM_DSN=NOBODY_THERE)("up")
+    assert (up.returncode, up.stdout) == (0, "")
+    assert "is running" in up.stderr
+    assert "ELM_DSN is set" in up.stderr
+    assert "running as process" in elm("doctor").stdout
+    assert elm("status").returncode == 0
+    assert "is stopped" in elm("down").stderr
+    stopped = elm("status")
+    assert stopped.returncode == 3
+    assert '"running":false' in stopped.stdout

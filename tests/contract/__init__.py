@@ -1,0 +1,1 @@
+"""The contract every store keeps, run over each of them."""
