@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from datetime import datetime
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 from uuid import UUID
@@ -13,7 +13,7 @@ import msgspec
 from uuid_utils.compat import uuid7
 
 from elm.errors import CycleRefused, InvalidValue
-from elm.features import Feature, FeatureValue, as_features, canonical
+from elm.features import Feature, FeatureValue, as_features, canonical, identity
 from elm.geometry import Region, outline
 from elm.interval import Interval
 from elm.text import check_short_name
@@ -38,8 +38,9 @@ class Payload:
                 f"a payload of {len(data):,} bytes is over the limit of {PAYLOAD_LIMIT:,}: "
                 f"keep it in a file and store the file's name"
             )
-        check_short_name(self.media_type, what="the media type of a payload")
+        media_type = check_short_name(self.media_type, what="the media type of a payload")
         object.__setattr__(self, "data", data)
+        object.__setattr__(self, "media_type", media_type)
 
     def __repr__(self) -> str:
         return f"Payload({self.media_type!r}, {len(self.data):,} bytes)"
@@ -83,7 +84,7 @@ class Event:
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        check_short_name(self.type, what="the type of an event")
+        object.__setattr__(self, "type", check_short_name(self.type, what="the type of an event"))
         for name, kind in (
             ("interval", Interval),
             ("region", Region),
@@ -94,9 +95,11 @@ class Event:
             if value is not None and not isinstance(value, kind):
                 raise InvalidValue(f"the {name} of an event is of class {kind.__name__}, not {value!r:.80}")
         if self.agent is not None:
-            check_short_name(self.agent, what="the agent of an event")
+            object.__setattr__(self, "agent", check_short_name(self.agent, what="the agent of an event"))
         if not isinstance(self.uid, UUID):
             raise InvalidValue(f"the uid of an event is a uuid.UUID, not {self.uid!r}")
+        if isinstance(self.parts, str) or not isinstance(self.parts, Iterable):
+            raise InvalidValue(f"the parts of an event are several uids, not {self.parts!r:.80}")
         parts = tuple(self.parts)
         for part in parts:
             if not isinstance(part, UUID):
@@ -109,6 +112,15 @@ class Event:
             raise InvalidValue(f"event {self.uid} of type {self.type!r} needs an interval, for it has no parts")
         object.__setattr__(self, "parts", parts)
         object.__setattr__(self, "features", as_features(self.features))
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Event):
+            return NotImplemented
+        names = [each.name for each in fields(Event)]
+        return _key(self, names) == _key(other, names)
+
+    def __hash__(self) -> int:
+        return hash(self.uid)
 
     @property
     def is_complex(self) -> bool:
@@ -260,7 +272,7 @@ class StoredEvent:
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, StoredEvent):
             return NotImplemented
-        return all(getattr(self, name) == getattr(other, name) for name in self.FIELDS)
+        return _key(self, self.FIELDS) == _key(other, self.FIELDS)
 
     def __hash__(self) -> int:
         return hash(self.uid)
@@ -270,6 +282,11 @@ class StoredEvent:
 
     def __repr__(self) -> str:
         return f"StoredEvent({self.id}, {self.type!r}, {self.interval}, uid={self.uid})"
+
+
+def _key(event: Event | StoredEvent, names: Iterable[str]) -> list[object]:
+    """What an event is compared by: Python's == would hold the feature values 1 and True for the same."""
+    return [[*map(identity, event.features)] if name == "features" else getattr(event, name) for name in names]
 
 
 _set_row = StoredEvent.__dict__["_row"].__set__

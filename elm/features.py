@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import combinations_with_replacement
 from typing import cast
+from zlib import crc32
 
 import numpy as np
 
@@ -18,7 +20,7 @@ Feature = tuple[str, FeatureValue]
 TOKEN_BYTES = 200
 """Longest token kept whole; a longer one becomes a prefix and a SHA-256 (an index entry must hold it)."""
 _PREFIX_CHARACTERS = 30
-_INT64 = range(-(2**63), 2**63)
+_INT64 = -(2**63), 2**63 - 1
 
 
 def kind_of(value: FeatureValue) -> str:
@@ -47,9 +49,9 @@ def check_value(name: str, value: object) -> FeatureValue:
     if isinstance(value, bool):
         return value
     if isinstance(value, str):
-        return str(check_text(value, what=f"the value of feature {name!r}"))
+        return check_text(value, what=f"the value of feature {name!r}")
     if isinstance(value, int):
-        if value not in _INT64:
+        if not _INT64[0] <= value <= _INT64[1]:
             raise InvalidValue(f"feature {name!r} is an integer beyond 64 bits ({value}): give it as text")
         return int(value)
     if isinstance(value, float):
@@ -65,13 +67,13 @@ def check_value(name: str, value: object) -> FeatureValue:
 def as_features(given: Mapping[str, object] | Iterable[tuple[str, object]]) -> tuple[Feature, ...]:
     """The features given as a mapping or as pairs, checked, in the order given, each once (it is a set)."""
     pairs = given.items() if isinstance(given, Mapping) else given
+    if isinstance(pairs, str | bytes) or not isinstance(pairs, Iterable):
+        raise InvalidValue(f"features are a mapping or several pairs (name, value), not {given!r:.80}")
     found: dict[tuple[str, str, FeatureValue], Feature] = {}
     for pair in pairs:
-        try:
-            name, raw = pair
-        except (TypeError, ValueError) as error:
-            raise InvalidValue(f"a feature is a pair (name, value), not {pair!r}") from error
-        check_name(name, what="a feature name")
+        if not isinstance(pair, tuple | list) or len(pair) != 2:
+            raise InvalidValue(f"a feature is a pair (name, value), not {pair!r:.80}")
+        name, raw = check_name(pair[0], what="a feature name"), pair[1]
         feature = (name, check_value(name, raw))
         found.setdefault(identity(feature), feature)
     return tuple(found.values())
@@ -118,3 +120,23 @@ def tokens(features: Iterable[Feature]) -> list[str]:
 def name_tokens(names: Iterable[str]) -> list[str]:
     """The folded names, each once, sorted by code point."""
     return sorted({fold(name) for name in names})
+
+
+def ends(sorted_tokens: Sequence[str]) -> int:
+    """A number of 64 bits that depends on the first and the last of some sorted tokens only.
+
+    A set within another has both its ends in it: an index on this number finds the candidates for a
+    `subset` by a few probes, where one on the tokens visits every event that shares any.
+    """
+    if not sorted_tokens:
+        return _EMPTY
+    return _EMPTY + (crc32(sorted_tokens[0].encode()) << 32 | crc32(sorted_tokens[-1].encode()))
+
+
+def ends_within(sorted_tokens: Sequence[str]) -> list[int]:
+    """The `ends` of every set that lies within the given one, the empty set's among them."""
+    pairs = combinations_with_replacement(sorted_tokens, 2)
+    return sorted({_EMPTY, *(ends(pair) for pair in pairs)})
+
+
+_EMPTY = -(2**63)

@@ -10,7 +10,7 @@ from typing import Any, Self
 
 import numpy as np
 import shapely
-from shapely.geometry import LineString, MultiPoint, Point, Polygon, box, shape
+from shapely.geometry import LineString, MultiPoint, Point, Polygon, box
 
 from elm.errors import InvalidValue
 from elm.text import check_short_name
@@ -45,9 +45,8 @@ class Region:
     _wkb: bytes | None
 
     def __init__(self, *, polygon: Polygon, frame: str = DEFAULT_FRAME) -> None:
-        check_short_name(frame, what="the frame of a region")
         _check_polygon(polygon)
-        object.__setattr__(self, "frame", frame)
+        object.__setattr__(self, "frame", check_short_name(frame, what="the frame of a region"))
         object.__setattr__(self, "_polygon", polygon)
         object.__setattr__(self, "_wkb", None)
 
@@ -67,21 +66,11 @@ class Region:
             raise InvalidValue(f'a polygon is a GeoJSON object {{"type": "Polygon", ...}}, not {geometry!r:.80}')
         if unknown := set(geometry) - {"type", "coordinates"}:
             raise InvalidValue(f"unknown keys in a GeoJSON polygon: {', '.join(map(repr, sorted(unknown)))}")
-        try:
-            polygon = shape(geometry)
-        except (
-            AttributeError,
-            IndexError,
-            KeyError,
-            TypeError,
-            ValueError,
-            shapely.errors.ShapelyError,
-        ) as error:
-            raise InvalidValue(f"the coordinates are not those of a GeoJSON polygon: {error}") from error
-        for ring in geometry["coordinates"]:
-            if list(ring[0]) != list(ring[-1]):
-                raise InvalidValue("a ring of a GeoJSON polygon must end where it begins: repeat its first point")
-        return cls(polygon=polygon, frame=frame)
+        rings = geometry.get("coordinates")
+        if not isinstance(rings, list) or not rings:
+            raise InvalidValue("the coordinates of a GeoJSON polygon are an array of rings, the outer one first")
+        shell, *holes = map(_ring_of, rings)
+        return cls(polygon=Polygon(shell, holes), frame=frame)
 
     @classmethod
     def box(cls, xmin: float, ymin: float, xmax: float, ymax: float, *, frame: str = DEFAULT_FRAME) -> Self:
@@ -207,6 +196,20 @@ def same_extent(given: Region, derived: Region | None) -> bool:
     if derived is None or given.frame != derived.frame:
         return False
     return bool(shapely.hausdorff_distance(given.polygon, derived.polygon) <= EXTENT_TOLERANCE)
+
+
+def _ring_of(ring: Any) -> list[tuple[float, float]]:
+    if not isinstance(ring, list) or len(ring) < 4:
+        raise InvalidValue("a ring of a GeoJSON polygon is an array of at least four points, the last like the first")
+    corners = [tuple(corner) if isinstance(corner, list) else () for corner in ring]
+    for corner in corners:
+        if len(corner) != 2 or not all(type(number) in (int, float) and abs(number) <= LIMIT for number in corner):
+            raise InvalidValue(
+                f"a point of a GeoJSON polygon is [x, y], numbers of metres up to {LIMIT:g}: not {list(corner)!r:.80}"
+            )
+    if corners[0] != corners[-1]:
+        raise InvalidValue("a ring of a GeoJSON polygon must end where it begins: repeat its first point")
+    return corners
 
 
 def _restore(wkb: bytes, frame: str) -> Region:

@@ -38,7 +38,8 @@ def as_utc(moment: datetime, *, what: str) -> datetime:
 def parse_time(text: str, *, what: str) -> datetime:
     """The instant an RFC 3339 text names; digits finer than a microsecond are cut, never rounded."""
     try:
-        moment = datetime.fromisoformat(text)
+        # RFC 3339 allows t and z; str.upper also refuses what is no text.
+        moment = datetime.fromisoformat(str.upper(text))
     except (TypeError, ValueError) as error:
         raise InvalidValue(
             f"{what} is not a time: {text!r}. Write it like 2026-01-01T10:00:04.5Z (RFC 3339)"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from elm.errors import CycleRefused, UnknownType
+from elm.errors import CycleRefused, InvalidValue, UnknownType
 from elm.text import check_short_name
 
 
@@ -17,11 +17,12 @@ class EventType:
     parents: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        check_short_name(self.name, what="the name of an event type")
-        parents = tuple(dict.fromkeys(self.parents))
-        for parent in parents:
-            check_short_name(parent, what=f"a parent of event type {self.name!r}")
-        object.__setattr__(self, "parents", parents)
+        object.__setattr__(self, "name", check_short_name(self.name, what="the name of an event type"))
+        if isinstance(self.parents, str) or not isinstance(self.parents, Iterable):
+            raise InvalidValue(f"the parents of event type {self.name!r} are several names, not {self.parents!r:.80}")
+        what = f"a parent of event type {self.name!r}"
+        parents = dict.fromkeys(check_short_name(parent, what=what) for parent in self.parents)
+        object.__setattr__(self, "parents", tuple(parents))
 
 
 class Taxonomy:

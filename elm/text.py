@@ -9,7 +9,7 @@ NAME_BYTES = 500
 
 
 def check_text(value: str, *, what: str) -> str:
-    """`value`, when every store can keep it: no NUL, no half of a surrogate pair."""
+    """`value` as plain str, when every store can keep it: no NUL, no half of a surrogate pair."""
     if not isinstance(value, str):
         raise InvalidValue(f"{what} must be text, not {type(value).__name__}: {value!r}")
     if "\x00" in value:
@@ -21,12 +21,13 @@ def check_text(value: str, *, what: str) -> str:
             raise InvalidValue(
                 f"{what} contains half of a surrogate pair, which is no character: {value[:60]!r}"
             ) from error
-    return value
+    # Of an enumeration the text it is, not the name it shows.
+    return value if type(value) is str else str.__str__(value)
 
 
 def check_name(value: str, *, what: str) -> str:
     """`value`, when it can name a type, frame, agent or feature: not empty, no control separator."""
-    check_text(value, what=what)
+    value = check_text(value, what=what)
     if not value:
         raise InvalidValue(f"{what} is empty: give it a name")
     if "\x1f" in value:
@@ -36,7 +37,7 @@ def check_name(value: str, *, what: str) -> str:
 
 def check_short_name(value: str, *, what: str) -> str:
     """`value`, when it is a name of at most `NAME_BYTES` bytes of UTF-8."""
-    check_name(value, what=what)
+    value = check_name(value, what=what)
     if len(value) > NAME_BYTES or (not value.isascii() and len(value.encode()) > NAME_BYTES):
         raise InvalidValue(f"{what} is longer than {NAME_BYTES} bytes: {value[:60]!r}... Shorten it")
     return value

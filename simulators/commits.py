@@ -119,9 +119,9 @@ def measure(dsn: str, *, events: int, seed: int, advance: Callable[[int], None])
             for turn in range(_BLOCKS):
                 for mode in in_turn(list(MODES), turn):
                     for number, group in enumerate(islice(groups, (_WARM_UP + per_block) // _GROUP)):
-                        counted = series[mode] if number * _GROUP >= _WARM_UP else Series()
-                        _commit(memories[mode], bare[mode], *group, number, counted)
-                        advance(_GROUP)
+                        is_counted = number * _GROUP >= _WARM_UP
+                        _commit(memories[mode], bare[mode], *group, number, series[mode] if is_counted else Series())
+                        advance(_GROUP if is_counted else 0)
         _check_count("events", memories["durable"].statistics().events, len(past) + needed)
         # Each group has nine rows beside the atomic events, and ten in each of two ways beside the complex one.
         _check_count("bare rows", bare["durable"].count(), needed // _GROUP * (PARTS + 2 * _GROUP))

@@ -63,6 +63,7 @@ STATEMENTS = (
         parts uuid[] NOT NULL,
         recorded_at timestamptz NOT NULL,
         content bytea NOT NULL,
+        feature_ends bigint NOT NULL,
         CONSTRAINT event_pkey PRIMARY KEY (id),
         CONSTRAINT event_uid_key UNIQUE (uid),
         CONSTRAINT event_whole_check CHECK (
@@ -85,9 +86,10 @@ STATEMENTS = (
     CREATE INDEX event_feature_names_idx ON event USING gin (feature_names)
     WITH (gin_pending_list_limit = 64)
     """,
+    "CREATE INDEX event_feature_ends_idx ON event (feature_ends)",
     "CREATE INDEX event_payload_idx ON event (sha256(payload)) WHERE payload IS NOT NULL",
-    "CREATE INDEX event_agent_begin_id_idx ON event (agent, lower(period), id) WHERE agent IS NOT NULL",
-    "CREATE INDEX event_recorded_at_id_idx ON event (recorded_at, id)",
+    "CREATE INDEX event_agent_idx ON event (agent) WHERE agent IS NOT NULL",
+    "CREATE INDEX event_recorded_at_idx ON event (recorded_at)",
     """
     CREATE TABLE part (
         whole_id bigint NOT NULL,

@@ -170,7 +170,7 @@ class TypeCue(Cue):
     def __post_init__(self) -> None:
         relation = named(self.relation, TypeRelation, what="the relation of a type cue")
         object.__setattr__(self, "relation", relation)
-        check_short_name(self.type, what="the type of a cue")
+        object.__setattr__(self, "type", check_short_name(self.type, what="the type of a cue"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -246,10 +246,8 @@ class FeatureNamesCue(Cue):
         object.__setattr__(self, "relation", relation)
         if isinstance(self.names, str):
             raise InvalidValue(f"feature names are given as several, not as one text: [{self.names!r}]")
-        names = tuple(dict.fromkeys(self.names))
-        for name in names:
-            check_name(name, what="a feature name of a cue")
-        object.__setattr__(self, "names", names)
+        names = dict.fromkeys(check_name(name, what="a feature name of a cue") for name in self.names)
+        object.__setattr__(self, "names", tuple(names))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -265,7 +263,7 @@ class FeatureCue(Cue):
     value: FeatureValue
 
     def __post_init__(self) -> None:
-        check_name(self.name, what="the feature name of a cue")
+        object.__setattr__(self, "name", check_name(self.name, what="the feature name of a cue"))
         compare = named(self.compare, Comparison, what="the comparison of a feature cue")
         object.__setattr__(self, "compare", compare)
         object.__setattr__(self, "value", check_value(self.name, self.value))
@@ -298,7 +296,7 @@ class AgentCue(Cue):
     agent: str
 
     def __post_init__(self) -> None:
-        check_short_name(self.agent, what="the agent of a cue")
+        object.__setattr__(self, "agent", check_short_name(self.agent, what="the agent of a cue"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -11,6 +11,7 @@ from geoalchemy2 import Geometry
 from sqlalchemy import (
     ARRAY,
     TIMESTAMP,
+    BigInteger,
     ColumnElement,
     Double,
     FromClause,
@@ -64,7 +65,7 @@ from elm.cues.algebra import (
     UidCue,
     node,
 )
-from elm.features import fold, kind_of, name_tokens, token, tokens, value_text
+from elm.features import ends_within, fold, kind_of, name_tokens, token, tokens, value_text
 from elm.geometry import SpatialRelation
 from elm.interval import AllenRelation
 from elm.storage.tables import event, part, type_closure
@@ -138,7 +139,7 @@ def _rule(cue: Cue, names: Names) -> Rule:
         case RegionCue() as condition:
             return _region(condition, names)
         case FeaturesCue(relation=relation, features=features):
-            return _text_set("features", relation, tokens(features), "feature_tokens")
+            return _feature_set(relation, tokens(features))
         case FeatureNamesCue(relation=relation, names=feature_names):
             return _text_set("feature_names", relation, name_tokens(feature_names), "feature_names")
         case FeatureCue() as condition:
@@ -362,6 +363,20 @@ def _spatial(relation: SpatialRelation, here: ColumnElement[Any], given: Any, *d
 
 
 # Features
+
+
+def _feature_set(relation: SetRelation, given: list[str]) -> Rule:
+    rule = _text_set("features", relation, given, "feature_tokens")
+    if relation is not SetRelation.SUBSET:
+        return rule
+    # The inverted index would visit all events that share a token, the ends find the few that may lie within;
+    # IS TRUE keeps the planner from taking the former.
+    values = (*rule.values, (ends_within(given), ARRAY(BigInteger)))
+
+    def build(e: FromClause, p: Bind, within: Bind) -> Condition:
+        return and_(rule.build(e, p).is_(true()), e.c.feature_ends == any_(within))
+
+    return Rule(rule.key, values, build)
 
 
 def _text_set(op: str, relation: SetRelation, given: list[str], name: str) -> Rule:

@@ -10,7 +10,7 @@ from uuid import UUID
 import msgspec
 
 from elm.event import Event, content_hash
-from elm.features import name_tokens, tokens
+from elm.features import ends, name_tokens, tokens
 from elm.geometry import Region
 from elm.interval import Interval
 
@@ -31,6 +31,7 @@ COLUMNS = (
     "parts",
     "recorded_at",
     "content",
+    "feature_ends",
 )
 """The order in which a row's values stand, and the parameters $1, $2 ... of the write statements."""
 
@@ -84,14 +85,14 @@ def texts(values: Sequence[str]) -> bytes:
 
 def row(event: Event, *, types: Mapping[str, int], frames: Mapping[str, int], recorded_at: datetime) -> Row:
     """The values of an event's `COLUMNS`; None is NULL. Extents of a complex event are those given, if any."""
-    payload = event.payload
+    payload, feature_tokens = event.payload, tokens(event.features)
     return (
         event.uid.bytes,
         int4(types[event.type]),
         None if event.interval is None else period(event.interval),
         *_place(event.region, frames),
         *_place(event.subject, frames),
-        texts(tokens(event.features)),
+        texts(feature_tokens),
         texts(name_tokens(name for name, _ in event.features)),
         msgspec.json.encode(event.features),
         None if event.agent is None else event.agent.encode(),
@@ -100,6 +101,7 @@ def row(event: Event, *, types: Mapping[str, int], frames: Mapping[str, int], re
         uuids(event.parts),
         timestamp(recorded_at),
         content_hash(event),
+        _int8(ends(feature_tokens)),
     )
 
 

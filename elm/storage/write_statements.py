@@ -40,18 +40,18 @@ def _filled(statement: str) -> str:
     )
 
 
-# Parameters $1 to $16 are `encoding.COLUMNS` in their order, $17 the time of writing.
+# Parameters $1 to $17 are `encoding.COLUMNS` in their order, $18 the time of writing.
 
 # An event in one round trip. A uid that is taken comes back only where the content is the same: the
 # update changes nothing, but unlike DO NOTHING it returns the row, also of a transaction just finished.
 COMMIT_ATOMIC = _filled("""
 WITH new AS (
     INSERT INTO event (<columns>)
-    VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, $13, $14, $15, $16)
+    VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, $13, $14, $15, $16, $17)
     ON CONFLICT (uid) DO UPDATE SET uid = excluded.uid WHERE event.content = excluded.content
     RETURNING id, xmax <> 0 AS existed
 ), logged AS (
-    INSERT INTO log_inbox (event_id, kind, agent, at) SELECT id, <commit>, $11, $17 FROM new WHERE NOT existed
+    INSERT INTO log_inbox (event_id, kind, agent, at) SELECT id, <commit>, $11, $18 FROM new WHERE NOT existed
 )
 SELECT id, existed FROM new
 """)
@@ -71,7 +71,7 @@ WITH g AS (
 ), new AS (
     INSERT INTO event (<columns>)
     SELECT $1, $2, x.period, x.frame_id, x.region, x.subject_frame_id, x.subject, $8, $9, $10,
-           coalesce($11, x.agent), $12, $13, $14, $15, $16
+           coalesce($11, x.agent), $12, $13, $14, $15, $16, $17
     FROM x, g
     WHERE x.found = cardinality($14) AND <agrees g.>
     ON CONFLICT (uid) DO UPDATE SET uid = excluded.uid WHERE event.content = excluded.content
@@ -82,7 +82,7 @@ WITH g AS (
     FROM new, unnest($14) WITH ORDINALITY AS asked (uid, ordinal) JOIN p USING (uid)
     WHERE NOT existed
 ), logged AS (
-    INSERT INTO log_inbox (event_id, kind, agent, at) SELECT id, <commit>, agent, $17 FROM new WHERE NOT existed
+    INSERT INTO log_inbox (event_id, kind, agent, at) SELECT id, <commit>, agent, $18 FROM new WHERE NOT existed
 )
 SELECT id, existed FROM new
 """)
@@ -94,7 +94,8 @@ CREATE_STAGING = """
 CREATE TEMPORARY TABLE IF NOT EXISTS staging (
     row integer NOT NULL, level integer NOT NULL, uid uuid, type_id integer, period tstzrange, frame_id integer,
     region geometry, subject_frame_id integer, subject geometry, feature_tokens text[], feature_names text[],
-    features json, agent text, media_type text, payload bytea, parts uuid[], recorded_at timestamptz, content bytea
+    features json, agent text, media_type text, payload bytea, parts uuid[], recorded_at timestamptz, content bytea,
+    feature_ends bigint
 ) ON COMMIT DELETE ROWS
 """
 
@@ -136,7 +137,7 @@ WITH p AS MATERIALIZED (
     INSERT INTO event (<columns>)
     SELECT s.uid, s.type_id, x.period, x.frame_id, x.region, x.subject_frame_id, x.subject, s.feature_tokens,
            s.feature_names, s.features, coalesce(s.agent, x.agent), s.media_type, s.payload, s.parts,
-           s.recorded_at, s.content
+           s.recorded_at, s.content, s.feature_ends
     FROM staging s JOIN x ON x.row = s.row
     WHERE s.level = %(level)s AND x.found = cardinality(s.parts) AND <agrees s.>
     ORDER BY s.row

@@ -26,6 +26,14 @@ def tell(store: Store, story: Story) -> Model:
     return model
 
 
+def numbered(types: Iterable[EventType], arrivals: Iterable[Arrival], store: Store) -> Model:
+    """The model of these arrivals with the ids that the store gave them, in whatever order it did."""
+    model, ids = Model(types), {event.uid: event.id for event in everything(store)}
+    for arrival in arrivals:
+        model.commit(arrival, id=ids[arrival.event.uid])
+    return model
+
+
 def story(*events: Event, types: Iterable[str] = ()) -> Story:
     """These events, learned of at second 0, and all types that they have."""
     names = dict.fromkeys([*types, *(event.type for event in events)])

@@ -48,6 +48,10 @@ class Robots:
         self._watch = opened.enter_context(psycopg.connect(dsn, autocommit=True))
         self.store = self.another()
         self.store.add_types([EventType(name="Thing")])
+        self._run(
+            f"CREATE FUNCTION {MEMORY}.stop() RETURNS trigger LANGUAGE plpgsql AS"
+            " 'BEGIN PERFORM pg_advisory_xact_lock_shared(1); RETURN NULL; END'"
+        )
 
     def another(self) -> PostgresStore:
         """A store over the memory with connections of its own."""
@@ -57,14 +61,16 @@ class Robots:
 
     @contextmanager
     def stopped_at(self, table: str) -> Iterator[None]:
-        """Whoever writes gets as far as its first row for `table` and no further until the block ends.
+        """Whoever inserts into `table` waits thereafter, amid the transaction, until the block ends.
 
-        For `log_inbox` that is the end of a commit, a load's first level, or a close: the locks they
-        need until then are held, and nothing of theirs can be seen.
+        For `log_inbox` that is when a commit, a close, or the first level of a load has done all else.
         """
-        with psycopg.connect(self._dsn) as connection:
-            connection.execute(f"LOCK TABLE {MEMORY}.{table} IN SHARE MODE".encode())
+        self._run(f"CREATE TRIGGER stop AFTER INSERT ON {MEMORY}.{table} EXECUTE FUNCTION {MEMORY}.stop()")
+        self._run("SELECT pg_advisory_lock(1)")
+        try:
             yield
+        finally:
+            self._run("SELECT pg_advisory_unlock(1)")
 
     def wait_for_locks(self, *waiting: Future[Any]) -> None:
         """Return once each of these has a statement that waits for a lock."""
@@ -99,6 +105,9 @@ class Robots:
             f" JOIN {MEMORY}.event_type a ON a.id = ancestor_id JOIN {MEMORY}.event_type d ON d.id = descendant_id"
         ).fetchall()
         return set(rows)
+
+    def _run(self, statement: str) -> None:
+        self._watch.execute(statement.encode())
 
     def _ask(self, query: str) -> tuple[Any, ...]:
         row: tuple[Any, ...] | None = self._watch.execute(query.encode()).fetchone()

@@ -21,8 +21,6 @@ from elm.features import Feature
 from tests.clock import at, span
 from tests.contents import HERE, ONE, OTHER_CONTENT, SAME_CONTENT, THERE, THREE, TWO, grasp
 
-UNFIXED = pytest.mark.xfail(strict=True, reason="not yet as it should be: see the expected behaviour")
-
 # Valid from birth
 
 
@@ -66,7 +64,7 @@ def test_parts_are_enough_instead_of_an_interval() -> None:
         ({"features": {"force": float("nan")}}, "force"),
         ({"features": {"force": None}}, "force"),
         ({"features": [("force",)]}, "pair"),
-        pytest.param({"features": None}, "feature", marks=UNFIXED),
+        ({"features": None}, "feature"),
         ({"agent": ""}, "the agent of an event"),
         ({"agent": 7}, "the agent of an event"),
         ({"agent": "a\x1fb"}, "the agent of an event"),
@@ -75,8 +73,8 @@ def test_parts_are_enough_instead_of_an_interval() -> None:
         ({"uid": None}, "the uid of an event"),
         ({"parts": [str(TWO)]}, "the parts of an event"),
         ({"parts": str(TWO)}, "the parts of an event"),
-        pytest.param({"parts": TWO}, "the parts of an event", marks=UNFIXED),
-        pytest.param({"parts": None}, "the parts of an event", marks=UNFIXED),
+        ({"parts": TWO}, "the parts of an event"),
+        ({"parts": None}, "the parts of an event"),
         ({"parts": [TWO, TWO]}, "a part twice"),
     ],
 )
@@ -136,7 +134,6 @@ class Kind(str, enum.Enum):  # noqa: UP042 - the older kind of enumeration is wh
     GRASP = "Grasp"
 
 
-@UNFIXED
 def test_a_type_of_a_derived_text_class_is_the_plain_text() -> None:
     event = Event(type=Kind.GRASP, interval=span(0, 1), agent=Kind.GRASP, uid=ONE)
     assert f"{event.type}/{event.agent}" == "Grasp/Grasp"
@@ -153,7 +150,6 @@ def test_closed_ends_an_open_event_and_leaves_the_rest() -> None:
 # What events are told apart by
 
 
-@UNFIXED
 def test_events_with_values_of_other_kinds_are_not_equal() -> None:
     """Python holds 1 and True for equal; here they are two values."""
     assert grasp(features={"on": 1}) == grasp(features={"on": 1.0})

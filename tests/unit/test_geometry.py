@@ -18,8 +18,6 @@ from shapely.geometry import LineString, MultiPolygon, Point, Polygon
 from elm.errors import InvalidValue
 from elm.geometry import EXTENT_TOLERANCE, LIMIT, Region, derived_region, outline, same_extent
 
-UNFIXED = pytest.mark.xfail(strict=True, reason="not yet as it should be: see the expected behaviour")
-
 SQUARE = [(0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (0.0, 4.0)]
 HOLE = [(1.0, 1.0), (2.0, 1.0), (2.0, 2.0), (1.0, 2.0)]
 OTHER_HOLE = [(3.0, 3.0), (3.5, 3.0), (3.5, 3.5)]
@@ -382,16 +380,16 @@ def test_a_given_extent_is_the_derived_one_within_a_micrometre() -> None:
         {"type": "MultiPolygon", "coordinates": [[[[0, 0], [1, 0], [1, 1], [0, 0]]]]},
         {"type": ["Polygon"], "coordinates": [[[0, 0], [1, 0], [1, 1], [0, 0]]]},
         {"type": "Polygon", "coordinates": [[[0, 0], [1, 0], [1, 1], [0, 0]]], "crs": "EPSG:4326"},
-        pytest.param({"type": "Polygon", "coordinates": None}, marks=UNFIXED),
+        {"type": "Polygon", "coordinates": None},
         {"type": "Polygon", "coordinates": 5},
         {"type": "Polygon", "coordinates": "ring"},
         {"type": "Polygon", "coordinates": {}},
         {"type": "Polygon", "coordinates": {"0": [[0, 0], [1, 0], [1, 1], [0, 0]]}},
         {"type": "Polygon", "coordinates": []},
-        pytest.param({"type": "Polygon", "coordinates": [[]]}, marks=UNFIXED),
-        pytest.param({"type": "Polygon", "coordinates": [None]}, marks=UNFIXED),
-        pytest.param({"type": "Polygon", "coordinates": [[[0, 0], [1, 0], [1, 1], [0, 0]], []]}, marks=UNFIXED),
-        pytest.param({"type": "Polygon", "coordinates": [[[0, 0], [1, 0], [1, 1], [0, 0]], None]}, marks=UNFIXED),
+        {"type": "Polygon", "coordinates": [[]]},
+        {"type": "Polygon", "coordinates": [None]},
+        {"type": "Polygon", "coordinates": [[[0, 0], [1, 0], [1, 1], [0, 0]], []]},
+        {"type": "Polygon", "coordinates": [[[0, 0], [1, 0], [1, 1], [0, 0]], None]},
         {"type": "Polygon", "coordinates": [[[0, 0]]]},
         {"type": "Polygon", "coordinates": [[[0, 0], [1, 0]]]},
         {"type": "Polygon", "coordinates": [[[0, 0], [1, 0], [0, 0]]]},
@@ -403,17 +401,12 @@ def test_a_given_extent_is_the_derived_one_within_a_micrometre() -> None:
         {"type": "Polygon", "coordinates": [[[0, 0], [1, 0, 5], [1, 1], [0, 0]]]},
         {"type": "Polygon", "coordinates": [[[0], [1], [1], [0]]]},
         {"type": "Polygon", "coordinates": [[["a", 0], [1, 0], [1, 1], ["a", 0]]]},
-        pytest.param(
-            {"type": "Polygon", "coordinates": [[["0", "0"], ["1", "0"], ["1", "1"], ["0", "0"]]]}, marks=UNFIXED
-        ),
+        {"type": "Polygon", "coordinates": [[["0", "0"], ["1", "0"], ["1", "1"], ["0", "0"]]]},
         {"type": "Polygon", "coordinates": [[[None, 0], [1, 0], [1, 1], [None, 0]]]},
-        pytest.param(
-            {"type": "Polygon", "coordinates": [[[False, False], [True, False], [True, True], [False, False]]]},
-            marks=UNFIXED,
-        ),
+        {"type": "Polygon", "coordinates": [[[False, False], [True, False], [True, True], [False, False]]]},
         {"type": "Polygon", "coordinates": [[[{}, 0], [1, 0], [1, 1], [{}, 0]]]},
-        pytest.param({"type": "Polygon", "coordinates": [[[0, 0], [1, 0], [1, math.nan], [0, 0]]]}, marks=UNFIXED),
-        pytest.param({"type": "Polygon", "coordinates": [[[0, 0], [1, 0], [1, 10**400], [0, 0]]]}, marks=UNFIXED),
+        {"type": "Polygon", "coordinates": [[[0, 0], [1, 0], [1, math.nan], [0, 0]]]},
+        {"type": "Polygon", "coordinates": [[[0, 0], [1, 0], [1, 10**400], [0, 0]]]},
         {"type": "Polygon", "coordinates": [[[0, 0], [1, 0], [1, 2e9], [0, 0]]]},
         {"type": "Polygon", "coordinates": [[[0, 0], [2, 2], [2, 0], [0, 2], [0, 0]]]},
         {"type": "Polygon", "coordinates": ["0000"]},

@@ -11,8 +11,6 @@ from hypothesis import strategies as st
 from elm.errors import CycleRefused, InvalidValue, UnknownType
 from elm.taxonomy import EventType, Taxonomy
 
-UNFIXED = pytest.mark.xfail(strict=True, reason="not yet as it should be: see the expected behaviour")
-
 
 def kind(name: str, *parents: str) -> EventType:
     return EventType(name=name, parents=parents)
@@ -43,7 +41,6 @@ def test_names_no_store_could_keep_are_refused(name: Any) -> None:
         EventType(name="Child", parents=(name,))
 
 
-@UNFIXED
 @pytest.mark.parametrize("parents", ["Motion", "M", None, 5])
 def test_parents_are_several_names_not_one_text(parents: Any) -> None:
     with pytest.raises(InvalidValue, match="parent"):
