@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 from datetime import datetime
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 from uuid import UUID
@@ -322,9 +322,3 @@ def content_hash(event: Event) -> bytes:
 
 def _place(region: Region | None) -> tuple[str, bytes] | None:
     return None if region is None else (region.frame, outline(region))
-
-
-def closed(event: Event, *, end: datetime) -> Event:
-    """The open event `event`, ended at `end`."""
-    assert event.interval is not None  # noqa: S101 - an open event has an interval
-    return replace(event, interval=Interval(begin=event.interval.begin, end=end))

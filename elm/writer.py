@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from datetime import datetime
@@ -66,8 +67,15 @@ class Writer:
         `progress` is told the number of events dealt with so far, after every batch.
         """
         read = new = existing = refusals = 0
-        for chunk in _batches(events, batch):
-            report = self._store.load(chunk)
+        under_way: deque[list[Arrival]] = deque()
+
+        def batches() -> Iterator[list[Arrival]]:
+            for chunk in _batches(events, batch):
+                under_way.append(chunk)
+                yield chunk
+
+        for report in self._store.load_all(batches()):
+            chunk = under_way.popleft()
             read += len(chunk)
             new += report.new
             existing += report.existing

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
 from uuid import UUID
 
 from elm.event import Event, content_hash
 from elm.storage import encoding
 from elm.storage import write_statements as sql
 from elm.storage.connections import Connection
+from elm.storage.event_writing import encoded
+from elm.storage.names import NameCache
 from elm.store import Arrival
 
 
@@ -51,15 +54,44 @@ def parts_to_come(arrivals: Sequence[Arrival]) -> dict[int, set[UUID]]:
     return {index: parts for index, parts in found.items() if parts}
 
 
-def stage(connection: Connection, rows: Mapping[int, encoding.Row], heights: Sequence[int]) -> None:
-    """Copy rows into the temporary table, under their index in the batch and with their level."""
-    connection.execute(sql.CREATE_STAGING)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Batch:
+    """A batch made ready to be sent: what is refused already, and the rest as the bytes of a binary COPY."""
+
+    arrivals: Sequence[Arrival]
+    now: datetime
+    heights: list[int]
+    refused: dict[int, str]
+    repeats: set[int]
+    kept: list[int]
+    copy: bytes
+
+
+def made_ready(arrivals: Sequence[Arrival], names: NameCache) -> Batch:
+    """What can be done for a batch without waiting for the database, but for names it has not seen yet."""
+    now = datetime.now(UTC)
+    refused, repeats = repeated(arrivals)
+    types = names.known_type_ids([arrival.event.type for arrival in arrivals])
+    for index, arrival in enumerate(arrivals):
+        if arrival.event.type not in types:
+            refused[index] = f"unknown event type {arrival.event.type!r}: add it first (`elm types add`)"
+    kept = [index for index in range(len(arrivals)) if index not in refused and index not in repeats]
+    heights = levels([arrival.event for arrival in arrivals])
+    rows = encoded([arrivals[index] for index in kept], names, now)
     count = 2 + len(encoding.COLUMNS)
+    copied = [
+        encoding.copied((encoding.int4(index), encoding.int4(heights[index]), *row), count)
+        for index, row in zip(kept, rows, strict=True)
+    ]
+    copy = b"".join([encoding.COPY_BEGIN, *copied, encoding.COPY_END])
+    return Batch(arrivals=arrivals, now=now, heights=heights, refused=refused, repeats=repeats, kept=kept, copy=copy)
+
+
+def stage(connection: Connection, batch: Batch) -> None:
+    """Copy a batch into the temporary table, under the rows' index in it and with their level."""
+    connection.execute(sql.CREATE_STAGING)
     with connection.cursor().copy(sql.COPY_STAGING) as copy:
-        copy.write(encoding.COPY_BEGIN)
-        for index, row in rows.items():
-            copy.write(encoding.copied((encoding.int4(index), encoding.int4(heights[index]), *row), count))
-        copy.write(encoding.COPY_END)
+        copy.write(batch.copy)
 
 
 def existing(connection: Connection) -> list[tuple[int, int, bool]]:
@@ -73,7 +105,7 @@ def drop(connection: Connection, indexes: Sequence[int]) -> None:
         connection.execute(sql.DROP_STAGED, {"rows": list(indexes)})
 
 
-def insert(connection: Connection, *, highest: int, now: Any) -> dict[UUID, bool]:
+def insert(connection: Connection, *, highest: int, now: datetime) -> dict[UUID, bool]:
     """Move the staged rows into the memory, lowest level first; uid -> whether it was there already."""
     taken = list(connection.execute(sql.LOAD_ATOMIC, {"now": now}, binary=True))
     if highest:

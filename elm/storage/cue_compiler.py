@@ -445,6 +445,8 @@ def _feature(cue: FeatureCue) -> Rule:
 
 def _kin(cue: KinCue) -> Rule:
     uids = (list(cue.uids), _UIDS)
+    if cue.kin is Kin.PARTS and not cue.transitive and cue.relation in (SetRelation.EQUAL, SetRelation.SUPERSET):
+        return _own_parts(cue)
     key = (cue.kin.value, cue.relation.value, cue.transitive, bool(cue.uids))
     lines = _Lines(cue.kin, transitive=cue.transitive)
 
@@ -467,6 +469,21 @@ def _kin(cue: KinCue) -> Rule:
                 assert_never(unknown)
 
     return Rule(key, (uids,), build)
+
+
+def _own_parts(cue: KinCue) -> Rule:
+    """The direct parts stand in the event's row; the links of one of the given find the few rows to look at."""
+    values = ((list(cue.uids), _UIDS), (cue.uids[0] if cue.uids else None, Uuid()))
+
+    def build(e: FromClause, p: Bind, one: Bind) -> Condition:
+        within = e.c.parts.op("<@", is_comparison=True)(p)
+        if not cue.uids:
+            return within if cue.relation is SetRelation.EQUAL else true()
+        wholes = select(part.c.whole_id).join(_other, _other.c.id == part.c.part_id).where(_other.c.uid == one)
+        covers = and_(e.c.id == any_(func.array(wholes.scalar_subquery())), e.c.parts.op("@>", is_comparison=True)(p))
+        return and_(covers, within) if cue.relation is SetRelation.EQUAL else covers
+
+    return Rule((cue.kin.value, cue.relation.value, "own", bool(cue.uids)), values, build)
 
 
 _other = event.alias("other")

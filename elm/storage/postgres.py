@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from datetime import UTC, datetime, timedelta
 from itertools import islice
 from typing import Any
@@ -21,9 +22,9 @@ from elm.features import identity, kind_of
 from elm.interval import Window
 from elm.storage import batch_loading, event_writing, recall_statements, schema, type_writing
 from elm.storage import write_statements as sql
+from elm.storage.batch_loading import Batch
 from elm.storage.connections import Connection, Connections
 from elm.storage.cue_compiler import CompiledCue, compile_cue
-from elm.storage.encoding import Row
 from elm.storage.names import NameCache
 from elm.storage.rows import FRAME_ID, SUBJECT_FRAME_ID, TYPE_ID, decoders, moment
 from elm.store import (
@@ -114,44 +115,44 @@ class PostgresStore:
 
     def load(self, arrivals: Sequence[Arrival]) -> BatchReport:
         """Keep what can be kept of a batch whose parts come before their wholes or are in the memory."""
+        return next(self.load_all([arrivals]))
+
+    def load_all(self, batches: Iterable[Sequence[Arrival]]) -> Iterator[BatchReport]:
+        """Load batches in turn; while the database takes one in, the next is made ready."""
         self._ready_to_write()
-        if not arrivals:
-            return BatchReport(new=0, existing=0, refused=())
-        refused, same = batch_loading.repeated(arrivals)
-        types = self._names.known_type_ids({arrival.event.type for arrival in arrivals})
-        for index, arrival in enumerate(arrivals):
-            if arrival.event.type not in types:
-                refused[index] = f"unknown event type {arrival.event.type!r}: add it first (`elm types add`)"
-        kept = [index for index in range(len(arrivals)) if index not in refused and index not in same]
-        now = datetime.now(UTC)
-        encoded = event_writing.encoded([arrivals[index] for index in kept], self._names, now)
-        rows = dict(zip(kept, encoded, strict=True))
-        with self._connections.writing() as connection, connection.transaction():
-            present = self._stage(connection, arrivals, rows, refused)
-            heights = batch_loading.levels([arrival.event for arrival in arrivals])
-            taken = batch_loading.insert(connection, highest=max(heights), now=now)
-            for index in rows.keys() - refused.keys() - present:
-                event = arrivals[index].event
-                if event.uid not in taken:
-                    parts = self._stored(connection, event.parts)
-                    refused[index] = str(event_writing.why_refused(event, parts))
+        with ThreadPoolExecutor(max_workers=1, thread_name_prefix="elm-load") as worker:
+            running: Future[BatchReport] | None = None
+            for arrivals in batches:
+                batch = batch_loading.made_ready(arrivals, self._names)
+                if running is not None:
+                    yield running.result()
+                running = worker.submit(self._load, batch)
+            if running is not None:
+                yield running.result()
+
+    def _load(self, batch: Batch) -> BatchReport:
+        arrivals, refused = batch.arrivals, batch.refused
+        taken: dict[UUID, bool] = {}
+        if batch.kept:
+            with self._connections.writing() as connection, connection.transaction():
+                present = self._stage(connection, batch)
+                taken = batch_loading.insert(connection, highest=max(batch.heights), now=batch.now)
+                for index in batch.kept:
+                    event = arrivals[index].event
+                    if index not in present and index not in refused and event.uid not in taken:
+                        parts = self._stored(connection, event.parts)
+                        refused[index] = str(event_writing.why_refused(event, parts))
         lost = {arrivals[index].event.uid for index in refused}
-        doubles = {index for index in same if arrivals[index].event.uid in lost}
+        doubles = {index for index in batch.repeats if arrivals[index].event.uid in lost}
         refused |= dict.fromkeys(doubles, "the same event was refused earlier in this batch")
         new = sum(not existed for existed in taken.values())
         reasons = tuple(Refusal(index=index, reason=refused[index]) for index in sorted(refused))
         return BatchReport(new=new, existing=len(arrivals) - new - len(reasons), refused=reasons)
 
-    def _stage(
-        self,
-        connection: Connection,
-        arrivals: Sequence[Arrival],
-        rows: Mapping[int, Row],
-        refused: dict[int, str],
-    ) -> set[int]:
-        """Stage the rows of a batch, less those that are in the memory (returned) and those that cannot be kept."""
-        heights = batch_loading.levels([arrival.event for arrival in arrivals])
-        batch_loading.stage(connection, rows, heights)
+    def _stage(self, connection: Connection, batch: Batch) -> set[int]:
+        """Stage a batch, less the rows that are in the memory (returned) and those that cannot be kept."""
+        arrivals, refused = batch.arrivals, batch.refused
+        batch_loading.stage(connection, batch)
         found = batch_loading.existing(connection)
         present = {index for index, _, _ in found}
         for index, _, same in found:
@@ -161,13 +162,13 @@ class PostgresStore:
                     event_writing.refuse_other(event, next(iter(self._stored(connection, [event.uid]))))
                 except ConflictingContent as error:
                     refused[index] = str(error)
-        later = {index: parts for index, parts in batch_loading.parts_to_come(arrivals).items() if index in rows}
+        later = {index: parts for index, parts in batch_loading.parts_to_come(arrivals).items() if index in batch.kept}
         kept = {each.uid for each in self._stored(connection, [uid for parts in later.values() for uid in parts])}
         for index, parts in later.items():
             if index not in present and (missing := parts - kept):
                 named = ", ".join(sorted(map(str, missing))[:5])
                 refused[index] = f"its parts {named} stand later in the load: move the whole behind them"
-        batch_loading.drop(connection, sorted(present | (rows.keys() & refused.keys())))
+        batch_loading.drop(connection, sorted(present | (set(batch.kept) & refused.keys())))
         return present
 
     def finish_load(self) -> None:
@@ -191,8 +192,8 @@ class PostgresStore:
     def find(self, query: Query) -> Iterator[StoredEvent]:
         """The events a query asks for, streamed from one consistent view."""
         text, values = self._asked("find", query, recall_statements.find)
-        limited = query.limit is not None and query.limit <= CHUNK
-        return self._events(text, values, at_once=limited)
+        few = recall_statements.is_pinned(query.cue) or (query.limit is not None and query.limit <= CHUNK)
+        return self._events(text, values, at_once=few)
 
     def ids(self, query: Query) -> Iterator[int]:
         """Their ids alone."""

@@ -43,7 +43,8 @@ class Robots:
     """One memory, written to over several connections, and looked at from outside."""
 
     def __init__(self, dsn: str, opened: ExitStack) -> None:
-        self._dsn = dsn
+        # A writer that waits for ever is a failure, not a hanging test.
+        self._dsn = psycopg.conninfo.make_conninfo(dsn, options="-c lock_timeout=20s")
         self._opened = opened
         self._watch = opened.enter_context(psycopg.connect(dsn, autocommit=True))
         self.store = self.another()
@@ -63,9 +64,9 @@ class Robots:
     def stopped_at(self, table: str) -> Iterator[None]:
         """Whoever inserts into `table` waits thereafter, amid the transaction, until the block ends.
 
-        For `log_inbox` that is when a commit, a close, or the first level of a load has done all else.
+        For `log_inbox` that is when a commit, a close, or a level of a load has done all else.
         """
-        self._run(f"CREATE TRIGGER stop AFTER INSERT ON {MEMORY}.{table} EXECUTE FUNCTION {MEMORY}.stop()")
+        self._run(f"CREATE TRIGGER stop AFTER INSERT ON {MEMORY}.{table} FOR EACH ROW EXECUTE FUNCTION {MEMORY}.stop()")
         self._run("SELECT pg_advisory_lock(1)")
         try:
             yield

@@ -6,8 +6,6 @@ import importlib.util
 import json
 import math
 import os
-import shutil
-import tempfile
 from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
@@ -21,7 +19,6 @@ import elm
 from elm import cues
 from elm.errors import StoreFailure
 from elm.interval import Interval
-from elm.storage.cluster import Cluster
 from simulators import hand_sql, hierarchy
 from simulators.__main__ import main
 from simulators.classes import check_same
@@ -31,24 +28,17 @@ from simulators.report import Goal
 from simulators.scratch import bare_schema, connect, scratch_memory, with_setting
 from simulators.timing import in_milliseconds, in_turn, mean_ratio, median_ratio
 from simulators.twins import Twins
+from tests.servers import Server
 
 HAS_PYARROW = importlib.util.find_spec("pyarrow") is not None
 SYNSETS = "id\tparents\tinstance_of\tlemmas\nn1\t\t\tentity\nn2\tn1\t\tthing\nn3\tn1,n2\t\tcup\nn4\t\tn3\tgrail\n"
 
 
 @pytest.fixture(scope="module")
-def dsn() -> Iterator[str]:
-    """A database in a private cluster of these tests."""
-    # Not below pytest's directories: the account that runs the server for root must get through.
-    directory = Path(tempfile.mkdtemp(prefix="elm-bench-"))
-    directory.chmod(0o755)
-    cluster = Cluster(home=directory / "home", settings={"fsync": "off"})
-    try:
-        cluster.up()
-        yield cluster.dsn()
-    finally:
-        cluster.down()
-        shutil.rmtree(directory)
+def dsn(postgres_server: Server) -> Iterator[str]:
+    """A database of these tests."""
+    with postgres_server.database() as address:
+        yield address
 
 
 def measured(tmp_path: Path, *arguments: str) -> dict[str, Any]:

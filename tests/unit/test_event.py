@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from shapely.geometry import Polygon
 
 from elm.errors import CycleRefused, InvalidValue
-from elm.event import Event, PartialEvent, Payload, StoredEvent, closed, content_hash
+from elm.event import Event, PartialEvent, Payload, StoredEvent, content_hash
 from elm.features import Feature
 from tests.clock import at, span
 from tests.contents import HERE, ONE, OTHER_CONTENT, SAME_CONTENT, THERE, THREE, TWO, grasp
@@ -137,14 +137,6 @@ class Kind(str, enum.Enum):  # noqa: UP042 - the older kind of enumeration is wh
 def test_a_type_of_a_derived_text_class_is_the_plain_text() -> None:
     event = Event(type=Kind.GRASP, interval=span(0, 1), agent=Kind.GRASP, uid=ONE)
     assert f"{event.type}/{event.agent}" == "Grasp/Grasp"
-
-
-def test_closed_ends_an_open_event_and_leaves_the_rest() -> None:
-    still_open = grasp(interval=span(1, None))
-
-    assert closed(still_open, end=at(3)) == grasp(interval=span(1, 3))
-    with pytest.raises(InvalidValue, match="before it begins"):
-        closed(still_open, end=at(0))
 
 
 # What events are told apart by
