@@ -13,8 +13,8 @@ import msgspec
 from uuid_utils.compat import uuid7
 
 from elm.errors import CycleRefused, InvalidValue
-from elm.features import Feature, FeatureValue, as_features, canonical, identity
-from elm.geometry import Region, outline
+from elm.features import Feature, FeatureValue, by_canonical, identity
+from elm.geometry import Region
 from elm.interval import Interval
 from elm.text import check_short_name
 
@@ -66,6 +66,8 @@ class Event:
     payload: Payload | None = None
     parts: tuple[UUID, ...] = ()
     uid: UUID = field(default_factory=uuid7)
+    canonical_features: tuple[str, ...] = field(init=False, repr=False)
+    """The canonical texts of the features, sorted: what hashes and indexes are made of."""
 
     if TYPE_CHECKING:
         # What may be given is wider than what is kept: checkers read this, dataclass writes the real one.
@@ -111,7 +113,9 @@ class Event:
         if self.interval is None and not parts:
             raise InvalidValue(f"event {self.uid} of type {self.type!r} needs an interval, for it has no parts")
         object.__setattr__(self, "parts", parts)
-        object.__setattr__(self, "features", as_features(self.features))
+        features = by_canonical(self.features)
+        object.__setattr__(self, "features", tuple(features.values()))
+        object.__setattr__(self, "canonical_features", tuple(sorted(features)))
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Event):
@@ -312,7 +316,7 @@ def content_hash(event: Event) -> bytes:
     canonical_form = (
         event.type,
         extents,
-        sorted(map(canonical, event.features)),
+        event.canonical_features,
         event.agent,
         None if event.payload is None else (event.payload.media_type, event.payload.data),
         sorted(part.bytes for part in event.parts),
@@ -321,4 +325,4 @@ def content_hash(event: Event) -> bytes:
 
 
 def _place(region: Region | None) -> tuple[str, bytes] | None:
-    return None if region is None else (region.frame, outline(region))
+    return None if region is None else (region.frame, region.outline)

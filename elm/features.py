@@ -66,17 +66,22 @@ def check_value(name: str, value: object) -> FeatureValue:
 
 def as_features(given: Mapping[str, object] | Iterable[tuple[str, object]]) -> tuple[Feature, ...]:
     """The features given as a mapping or as pairs, checked, in the order given, each once (it is a set)."""
+    return tuple(by_canonical(given).values())
+
+
+def by_canonical(given: Mapping[str, object] | Iterable[tuple[str, object]]) -> dict[str, Feature]:
+    """The features given, checked, in the order given, each under its canonical text and so once."""
     pairs = given.items() if isinstance(given, Mapping) else given
     if isinstance(pairs, str | bytes) or not isinstance(pairs, Iterable):
         raise InvalidValue(f"features are a mapping or several pairs (name, value), not {given!r:.80}")
-    found: dict[tuple[str, str, FeatureValue], Feature] = {}
+    found: dict[str, Feature] = {}
     for pair in pairs:
         if not isinstance(pair, tuple | list) or len(pair) != 2:
             raise InvalidValue(f"a feature is a pair (name, value), not {pair!r:.80}")
         name, raw = check_name(pair[0], what="a feature name"), pair[1]
         feature = (name, check_value(name, raw))
-        found.setdefault(identity(feature), feature)
-    return tuple(found.values())
+        found.setdefault(canonical(feature), feature)
+    return found
 
 
 def value_text(value: FeatureValue) -> str:

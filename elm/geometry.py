@@ -6,7 +6,7 @@ import struct
 from collections.abc import Iterable, Sequence
 from enum import StrEnum
 from itertools import chain, pairwise
-from typing import Any, Self
+from typing import Any, Self, cast
 
 import numpy as np
 import shapely
@@ -38,17 +38,21 @@ class Region:
     Two regions are equal when frame and outline agree, whatever the ring's first corner or direction.
     """
 
-    __slots__ = ("_polygon", "_wkb", "frame")
+    __slots__ = ("_outline", "_polygon", "frame", "wkb")
 
     frame: str
+    wkb: bytes
+    """The polygon as little-endian well-known binary."""
     _polygon: Polygon | None
-    _wkb: bytes | None
+    _outline: bytes | None
 
     def __init__(self, *, polygon: Polygon, frame: str = DEFAULT_FRAME) -> None:
         _check_polygon(polygon)
         object.__setattr__(self, "frame", check_short_name(frame, what="the frame of a region"))
         object.__setattr__(self, "_polygon", polygon)
-        object.__setattr__(self, "_wkb", None)
+        # Encoded at birth, not while a commit waits for it: what every store and every comparison needs.
+        object.__setattr__(self, "wkb", shapely.to_wkb(polygon, byte_order=1, include_srid=False))
+        object.__setattr__(self, "_outline", _outline(self.wkb))
 
     @classmethod
     def from_wkb(cls, wkb: bytes, *, frame: str) -> Self:
@@ -56,7 +60,8 @@ class Region:
         region = cls.__new__(cls)
         object.__setattr__(region, "frame", frame)
         object.__setattr__(region, "_polygon", None)
-        object.__setattr__(region, "_wkb", wkb)
+        object.__setattr__(region, "wkb", wkb)
+        object.__setattr__(region, "_outline", None)
         return region
 
     @classmethod
@@ -101,17 +106,20 @@ class Region:
     def polygon(self) -> Polygon:
         """The polygon, in metres of the frame."""
         if self._polygon is None:
-            object.__setattr__(self, "_polygon", shapely.from_wkb(self._wkb))
-        assert self._polygon is not None  # noqa: S101 - decoded above
+            object.__setattr__(self, "_polygon", shapely.from_wkb(self.wkb))
         return self._polygon
 
     @property
-    def wkb(self) -> bytes:
-        """The polygon as little-endian well-known binary."""
-        if self._wkb is None:
-            object.__setattr__(self, "_wkb", shapely.to_wkb(self._polygon, byte_order=1, include_srid=False))
-        assert self._wkb is not None  # noqa: S101 - encoded above
-        return self._wkb
+    def outline(self) -> bytes:
+        """The corners as bytes: the same for one place, whatever ring order, direction or repeated points say it.
+
+        Nor does the sign of zero matter. Each ring begins at its smallest corner and goes on to the smaller of
+        that corner's neighbours; holes are sorted. Read from the well-known binary, not normalised by GEOS:
+        what is the same content must not depend on a library's version.
+        """
+        if self._outline is None:
+            object.__setattr__(self, "_outline", _outline(self.wkb))
+        return cast(bytes, self._outline)
 
     @property
     def geojson(self) -> dict[str, Any]:
@@ -126,10 +134,10 @@ class Region:
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Region):
             return NotImplemented
-        return self.frame == other.frame and outline(self) == outline(other)
+        return self.frame == other.frame and self.outline == other.outline
 
     def __hash__(self) -> int:
-        return hash((self.frame, outline(self)))
+        return hash((self.frame, self.outline))
 
     def __setattr__(self, name: str, value: object) -> None:
         raise AttributeError(f"a Region is immutable: make a new one instead of setting {name!r}")
@@ -143,14 +151,7 @@ class Region:
         return f"Region({self.frame!r}, {corners} corners in {xmin:g}..{xmax:g} x {ymin:g}..{ymax:g} m)"
 
 
-def outline(region: Region) -> bytes:
-    """The corners as bytes: the same for one place, whatever ring order, direction or repeated points say it.
-
-    Nor does the sign of zero matter. Each ring begins at its smallest corner and goes on to the smaller of
-    that corner's neighbours; holes are sorted. Read from the well-known binary, not normalised by GEOS:
-    what is the same content must not depend on a library's version.
-    """
-    wkb = region.wkb
+def _outline(wkb: bytes) -> bytes:
     (rings,) = _COUNT.unpack_from(wkb, 5)
     at, outlines = 9, []
     for _ in range(rings):

@@ -12,8 +12,8 @@ from elm.event import Event
 from elm.interval import as_utc
 from elm.store import Arrival, Closed, Committed, Store
 
-LOAD_BATCH = 5_000
-"""Events of a load that are kept in one transaction."""
+LOAD_BATCH = 1_000
+"""Events of a load that are kept in one transaction; the next batch is encoded while the database takes one in."""
 BATCH_BYTES = 64 * 1024 * 1024
 """Bytes of payload after which a batch is not filled further: it is in memory as a whole."""
 

@@ -10,7 +10,7 @@ from uuid import UUID
 import msgspec
 
 from elm.event import Event, content_hash
-from elm.features import ends, name_tokens, tokens
+from elm.features import ends, fold, name_tokens
 from elm.geometry import Region
 from elm.interval import Interval
 
@@ -85,7 +85,7 @@ def texts(values: Sequence[str]) -> bytes:
 
 def row(event: Event, *, types: Mapping[str, int], frames: Mapping[str, int], recorded_at: datetime) -> Row:
     """The values of an event's `COLUMNS`; None is NULL. Extents of a complex event are those given, if any."""
-    payload, feature_tokens = event.payload, tokens(event.features)
+    payload, feature_tokens = event.payload, sorted(map(fold, event.canonical_features))
     return (
         event.uid.bytes,
         int4(types[event.type]),

@@ -10,7 +10,12 @@ from elm.storage.connections import Connection, Connections
 UNKNOWN_FRAME = -1
 """A frame number that no event has."""
 
-_TYPES_BY_NAME = "SELECT id, name FROM event_type WHERE name = ANY(%s)"
+# With the types asked for come those that are not known yet, up to a number that takes some 30 ms: asked
+# for one by one, each type would delay the first event it has.
+_TYPES_BY_NAME = """
+SELECT id, name FROM event_type WHERE name = ANY(%(missing)s)
+UNION (SELECT id, name FROM event_type WHERE id > %(seen)s ORDER BY id LIMIT 20000)
+"""
 _TYPES_BY_ID = "SELECT id, name FROM event_type WHERE id = ANY(%s)"
 
 
@@ -47,7 +52,7 @@ class NameCache:
         missing = [name for name in names if name not in self._type_ids]
         if missing:
             with self._connections.recalling() as connection:
-                self._keep(connection.execute(_TYPES_BY_NAME, [missing]).fetchall())
+                self._keep(connection.execute(_TYPES_BY_NAME, {"missing": missing, "seen": max(self.types, default=0)}))
         return self._type_ids
 
     def frame_id(self, name: str) -> int:

@@ -9,10 +9,10 @@ from elm.storage.tables import LOG_CLOSE, LOG_COMMIT
 # would change the hull's last digits. In uid order, so that every store finds the same ones.
 _EXTENT = """
     range_merge(range_agg(p.period)) AS period,
-    CASE WHEN count(DISTINCT p.frame_id) = 1 THEN min(p.frame_id) END AS frame_id,
-    CASE WHEN count(DISTINCT p.frame_id) = 1 THEN ST_ConvexHull(ST_Collect(p.region ORDER BY p.uid)) END AS region,
-    CASE WHEN count(DISTINCT p.subject_frame_id) = 1 THEN min(p.subject_frame_id) END AS subject_frame_id,
-    CASE WHEN count(DISTINCT p.subject_frame_id) = 1
+    CASE WHEN min(p.frame_id) = max(p.frame_id) THEN min(p.frame_id) END AS frame_id,
+    CASE WHEN min(p.frame_id) = max(p.frame_id) THEN ST_ConvexHull(ST_Collect(p.region ORDER BY p.uid)) END AS region,
+    CASE WHEN min(p.subject_frame_id) = max(p.subject_frame_id) THEN min(p.subject_frame_id) END AS subject_frame_id,
+    CASE WHEN min(p.subject_frame_id) = max(p.subject_frame_id)
          THEN ST_ConvexHull(ST_Collect(p.subject ORDER BY p.uid)) END AS subject,
     CASE WHEN count(p.agent) = count(*) AND min(p.agent) = max(p.agent) THEN min(p.agent) END AS agent
 """

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from hypothesis import Phase, settings
+
 from elm.cues.algebra import And, Cue
 from elm.errors import ElmError, StoreFailure
 from elm.event import Event, StoredEvent
@@ -12,6 +14,9 @@ from elm.taxonomy import EventType
 from tests.clock import at
 from tests.model import Model, same_events
 from tests.strategies import Story
+
+few_memories = settings(max_examples=20, phases=[Phase.explicit, Phase.reuse, Phase.generate, Phase.shrink])
+"""For random tests: making a memory in a database takes longer than asking it, so each is asked several things."""
 
 
 def tell(store: Store, story: Story) -> Model:

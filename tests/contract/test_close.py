@@ -7,7 +7,7 @@ from typing import Any
 from uuid import UUID
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from elm import cues
@@ -18,7 +18,7 @@ from elm.store import Arrival, Store
 from elm.writer import Writer
 from tests.clock import ZERO, at, span
 from tests.conftest import StoreFactory
-from tests.contract.telling import everything, holds, is_clear, story, tell
+from tests.contract.telling import everything, few_memories, holds, is_clear, story, tell
 from tests.model import Model, same_events
 from tests.strategies import Story, stories
 
@@ -207,7 +207,7 @@ def test_a_whole_committed_after_the_close_is_closed(store: Store) -> None:
     assert intervals(store)[Q] == span(1, 5)
 
 
-@settings(max_examples=20)
+@few_memories
 @given(stories(), st.data())
 def test_whatever_is_closed_in_any_order_the_memory_is_as_it_must_be(
     store_factory: StoreFactory, told: Story, data: st.DataObject

@@ -10,7 +10,7 @@ from typing import Any
 from uuid import UUID
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from shapely.geometry import Polygon
 
@@ -24,7 +24,7 @@ from elm.taxonomy import EventType
 from tests.clock import at, span
 from tests.conftest import StoreFactory
 from tests.contents import CONTENT_TYPES, ONE, OTHER_CONTENT, SAME_CONTENT, THREE, TWO, grasp
-from tests.contract.telling import everything, holds, is_clear, numbered, story, tell
+from tests.contract.telling import everything, few_memories, holds, is_clear, numbered, story, tell
 from tests.model import same_events
 from tests.strategies import UIDS, Story, stories
 
@@ -250,7 +250,7 @@ def test_no_events_are_committed_as_nothing(typed: Store) -> None:
     assert everything(typed) == []
 
 
-@settings(max_examples=20)
+@few_memories
 @given(stories(), st.randoms(use_true_random=False))
 def test_however_a_story_is_told_the_same_events_are_held(
     store_factory: StoreFactory, told: Story, random: Any
@@ -273,7 +273,7 @@ def test_however_a_story_is_told_the_same_events_are_held(
         assert holds(other, numbered(told.types, told.arrivals, other))
 
 
-@settings(max_examples=20)
+@few_memories
 @given(stories())
 def test_what_was_recalled_is_the_same_content_again(store_factory: StoreFactory, told: Story) -> None:
     """With derived extents and agents, as an export would say it."""

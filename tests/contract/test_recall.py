@@ -32,12 +32,9 @@ from elm.store import (
 )
 from tests.clock import at, span
 from tests.conftest import StoreFactory
-from tests.contract.telling import everything, found, holds, story, tell
+from tests.contract.telling import everything, few_memories, found, holds, story, tell
 from tests.model import ids_of, same_events
 from tests.strategies import CUE_CLASSES, NAMES, TYPE_NAMES, UIDS, Story, combined_cues, regions, single_cues, stories
-
-few_memories = settings(max_examples=20)
-"""Making a memory takes longer than asking it: each is asked several things."""
 
 SOME_CUES = st.lists(single_cues(TYPE_NAMES), min_size=1, max_size=4)
 LIMITS = st.none() | st.integers(0, 5)
@@ -54,7 +51,7 @@ def ordered(events: list[StoredEvent], order: Order) -> list[StoredEvent]:
 # Every cue
 
 
-@settings(max_examples=15)
+@few_memories
 @given(st.data())
 def test_cues_of_every_class_recall_what_a_full_scan_finds(store_factory: StoreFactory, data: st.DataObject) -> None:
     store = store_factory()

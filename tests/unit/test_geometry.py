@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from shapely.geometry import LineString, MultiPolygon, Point, Polygon
 
 from elm.errors import InvalidValue
-from elm.geometry import EXTENT_TOLERANCE, LIMIT, Region, derived_region, outline, same_extent
+from elm.geometry import EXTENT_TOLERANCE, LIMIT, Region, derived_region, same_extent
 
 SQUARE = [(0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (0.0, 4.0)]
 HOLE = [(1.0, 1.0), (2.0, 1.0), (2.0, 2.0), (1.0, 2.0)]
@@ -103,7 +103,7 @@ def test_the_longest_frame_is_accepted() -> None:
 def test_the_same_outline_is_the_same_region(why: str, same: Region) -> None:
     assert same == region(SQUARE), why
     assert hash(same) == hash(region(SQUARE)), why
-    assert outline(same) == outline(region(SQUARE)), why
+    assert same.outline == region(SQUARE).outline, why
 
 
 @pytest.mark.parametrize(
@@ -118,7 +118,7 @@ def test_the_same_outline_is_the_same_region(why: str, same: Region) -> None:
 )
 def test_another_outline_or_frame_is_another_region(why: str, other: Region) -> None:
     assert other != region(SQUARE), why
-    assert (other.frame, outline(other)) != ("map", outline(region(SQUARE))), why
+    assert (other.frame, other.outline) != ("map", region(SQUARE).outline), why
 
 
 def test_holes_count_as_a_set_in_any_order_and_direction() -> None:
@@ -162,7 +162,7 @@ def test_however_a_polygon_is_written_it_is_the_same_region(data: st.DataObject)
     other = Region(polygon=Polygon(_rewritten(draw, shell), [_rewritten(draw, hole) for hole in holes]))
     assert one == other
     assert hash(one) == hash(other)
-    assert outline(one) == outline(other)
+    assert one.outline == other.outline
 
 
 @given(POLYGONS, POLYGONS)
@@ -173,7 +173,7 @@ def test_two_regions_are_equal_exactly_when_their_normal_forms_are(one: Polygon,
 
     same = normal(one) == normal(other)
     assert (Region(polygon=one) == Region(polygon=other)) == same
-    assert (outline(Region(polygon=one)) == outline(Region(polygon=other))) == same
+    assert (Region(polygon=one).outline == Region(polygon=other).outline) == same
 
 
 # What a region is to others
