@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from uuid import UUID
 
-from elm.event import Event, content_hash
+from elm.errors import ConflictingContent
+from elm.event import Event, StoredEvent, content_hash
 from elm.storage import encoding
 from elm.storage import write_statements as sql
 from elm.storage.connections import Connection
-from elm.storage.event_writing import encoded
+from elm.storage.event_writing import encoded, refuse_other, why_refused
 from elm.storage.names import NameCache
-from elm.store import Arrival
+from elm.store import Arrival, BatchReport, Refusal
 
 
 def levels(events: Sequence[Event]) -> list[int]:
@@ -113,3 +114,50 @@ def insert(connection: Connection, *, highest: int, now: datetime) -> dict[UUID,
     for level in range(1, highest + 1):
         taken += connection.execute(sql.LOAD_LEVEL, {"level": level, "now": now}, binary=True)
     return {UUID(bytes=uid): existed for uid, existed in taken}
+
+
+Stored = Callable[[Sequence[UUID]], Iterable[StoredEvent]]
+"""Gives the events of some uids, as the loading transaction sees them."""
+
+
+def load(connection: Connection, batch: Batch, stored: Stored) -> BatchReport:
+    """Keep what can be kept of a batch, in the transaction that the connection is in."""
+    arrivals, refused = batch.arrivals, batch.refused
+    taken: dict[UUID, bool] = {}
+    if batch.kept:
+        stage(connection, batch)
+        present = _set_aside(connection, batch, stored)
+        taken = insert(connection, highest=max(batch.heights), now=batch.now)
+        for index in batch.kept:
+            event = arrivals[index].event
+            if index not in present and index not in refused and event.uid not in taken:
+                refused[index] = str(why_refused(event, stored(event.parts)))
+    lost = {arrivals[index].event.uid for index in refused}
+    doubles = {index for index in batch.repeats if arrivals[index].event.uid in lost}
+    refused |= dict.fromkeys(doubles, "the same event was refused earlier in this batch")
+    new = sum(not existed for existed in taken.values())
+    reasons = tuple(Refusal(index=index, reason=refused[index]) for index in sorted(refused))
+    return BatchReport(new=new, existing=len(arrivals) - new - len(reasons), refused=reasons)
+
+
+def _set_aside(connection: Connection, batch: Batch, stored: Stored) -> set[int]:
+    """Take the staged rows out that are in the memory (returned) and those that cannot be kept."""
+    arrivals, refused = batch.arrivals, batch.refused
+    found = existing(connection)
+    present = {index for index, _, _ in found}
+    for index, _, same in found:
+        event = arrivals[index].event
+        if not same:
+            try:
+                refuse_other(event, next(iter(stored([event.uid]))))
+            except ConflictingContent as error:
+                refused[index] = str(error)
+    kept = set(batch.kept)
+    later = {index: parts for index, parts in parts_to_come(arrivals).items() if index in kept}
+    known = {each.uid for each in stored([uid for parts in later.values() for uid in parts])}
+    for index, parts in later.items():
+        if index not in present and (missing := parts - known):
+            named = ", ".join(sorted(map(str, missing))[:5])
+            refused[index] = f"its parts {named} stand later in the load: move the whole behind them"
+    drop(connection, sorted(present | (kept & refused.keys())))
+    return present

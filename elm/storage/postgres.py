@@ -4,23 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime
+from functools import partial
 from itertools import islice
 from typing import Any
 from uuid import UUID
 
-import msgspec
 import psycopg
 from sqlalchemy import Select
 
 from elm.cues.algebra import Cue, UidCue
 from elm.cues.codec import cue_to_json
-from elm.errors import ConflictingContent
 from elm.event import StoredEvent
 from elm.exchange import to_line
-from elm.features import identity, kind_of
 from elm.interval import Window
-from elm.storage import batch_loading, event_writing, recall_statements, schema, type_writing
+from elm.storage import batch_loading, event_writing, grouping, hints, recall_statements, schema, type_writing
 from elm.storage import write_statements as sql
 from elm.storage.batch_loading import Batch
 from elm.storage.connections import Connection, Connections
@@ -39,7 +37,6 @@ from elm.store import (
     Grouping,
     Join,
     Query,
-    Refusal,
     Statistics,
     TypesAdded,
 )
@@ -131,45 +128,8 @@ class PostgresStore:
                 yield running.result()
 
     def _load(self, batch: Batch) -> BatchReport:
-        arrivals, refused = batch.arrivals, batch.refused
-        taken: dict[UUID, bool] = {}
-        if batch.kept:
-            with self._connections.writing() as connection, connection.transaction():
-                present = self._stage(connection, batch)
-                taken = batch_loading.insert(connection, highest=max(batch.heights), now=batch.now)
-                for index in batch.kept:
-                    event = arrivals[index].event
-                    if index not in present and index not in refused and event.uid not in taken:
-                        parts = self._stored(connection, event.parts)
-                        refused[index] = str(event_writing.why_refused(event, parts))
-        lost = {arrivals[index].event.uid for index in refused}
-        doubles = {index for index in batch.repeats if arrivals[index].event.uid in lost}
-        refused |= dict.fromkeys(doubles, "the same event was refused earlier in this batch")
-        new = sum(not existed for existed in taken.values())
-        reasons = tuple(Refusal(index=index, reason=refused[index]) for index in sorted(refused))
-        return BatchReport(new=new, existing=len(arrivals) - new - len(reasons), refused=reasons)
-
-    def _stage(self, connection: Connection, batch: Batch) -> set[int]:
-        """Stage a batch, less the rows that are in the memory (returned) and those that cannot be kept."""
-        arrivals, refused = batch.arrivals, batch.refused
-        batch_loading.stage(connection, batch)
-        found = batch_loading.existing(connection)
-        present = {index for index, _, _ in found}
-        for index, _, same in found:
-            event = arrivals[index].event
-            if not same:
-                try:
-                    event_writing.refuse_other(event, next(iter(self._stored(connection, [event.uid]))))
-                except ConflictingContent as error:
-                    refused[index] = str(error)
-        later = {index: parts for index, parts in batch_loading.parts_to_come(arrivals).items() if index in batch.kept}
-        kept = {each.uid for each in self._stored(connection, [uid for parts in later.values() for uid in parts])}
-        for index, parts in later.items():
-            if index not in present and (missing := parts - kept):
-                named = ", ".join(sorted(map(str, missing))[:5])
-                refused[index] = f"its parts {named} stand later in the load: move the whole behind them"
-        batch_loading.drop(connection, sorted(present | (set(batch.kept) & refused.keys())))
-        return present
+        with self._connections.writing() as connection, connection.transaction():
+            return batch_loading.load(connection, batch, partial(self._stored, connection))
 
     def finish_load(self) -> None:
         """Bring the planner's statistics up to date."""
@@ -192,7 +152,7 @@ class PostgresStore:
     def find(self, query: Query) -> Iterator[StoredEvent]:
         """The events a query asks for, streamed from one consistent view."""
         text, values = self._asked("find", query, recall_statements.find)
-        few = recall_statements.is_pinned(query.cue) or (query.limit is not None and query.limit <= CHUNK)
+        few = hints.is_pinned(query.cue) or (query.limit is not None and query.limit <= CHUNK)
         return self._events(text, values, at_once=few)
 
     def ids(self, query: Query) -> Iterator[int]:
@@ -232,7 +192,7 @@ class PostgresStore:
                 self._names.learn(connection, [row[0] for row in rows], [])
             if by is Grouping.FRAME:
                 self._names.learn(connection, [], [row[0] for row in rows])
-        return _merged(rows, by, self._names)
+        return grouping.merged(rows, by, self._names)
 
     def join(self, join: Join) -> Iterator[tuple[StoredEvent, StoredEvent | None]]:
         """Each anchor, in order, with the neighbour found for it."""
@@ -407,57 +367,4 @@ class PostgresStore:
 
 
 def _hints(query: Query) -> tuple[bool, Window]:
-    return recall_statements.is_pinned(query.cue), recall_statements.begins_within(query.cue)
-
-
-def _merged(rows: Sequence[Sequence[Any]], by: Grouping | ByFeature, names: NameCache) -> list[Group]:
-    """The groups of the rows of `recall_statements.groups`, sorted; values that are one number are one key."""
-    groups: dict[Any, Group] = {}
-    for *raw, number, micros, first, last, is_open in rows:
-        key = _key(raw, by, names)
-        shown = key if key is None or not isinstance(by, ByFeature) else identity(("", key))
-        group = Group(
-            key=key,
-            count=number,
-            duration=timedelta(microseconds=micros),
-            first_begin=moment(first),
-            last_end=None if is_open else moment(last),
-        )
-        known = groups.get(shown)
-        groups[shown] = group if known is None else _together(known, group)
-    return sorted(groups.values(), key=lambda group: _place(group.key))
-
-
-def _key(raw: Sequence[Any], by: Grouping | ByFeature, names: NameCache) -> Any:
-    if any(part is None for part in raw):
-        return None
-    match by:
-        case Grouping.TYPE:
-            return names.types[raw[0]]
-        case Grouping.FRAME:
-            return names.frames[raw[0]]
-        case Grouping.AGENT:
-            return raw[0]
-        case Grouping.DAY | Grouping.HOUR:
-            return moment(raw[0])
-        case ByFeature():
-            kind, text = raw
-            return text if kind == "string" else msgspec.json.decode(text)
-
-
-def _together(one: Group, other: Group) -> Group:
-    ends = (one.last_end, other.last_end)
-    return Group(
-        key=one.key,
-        count=one.count + other.count,
-        duration=one.duration + other.duration,
-        first_begin=min(one.first_begin, other.first_begin),
-        last_end=None if None in ends else max(end for end in ends if end is not None),
-    )
-
-
-def _place(key: Any) -> tuple[bool, str, Any]:
-    """Where a key stands: None last; of feature values bools before numbers before strings."""
-    if key is None:
-        return True, "", 0
-    return False, "" if isinstance(key, datetime) else kind_of(key), key
+    return hints.is_pinned(query.cue), hints.begins_within(query.cue)

@@ -34,9 +34,10 @@ from sqlalchemy import (
 )
 from sqlalchemy.dialects.postgresql import psycopg
 
-from elm.cues.algebra import And, Cue, KinCue, PayloadCue, Place, SetRelation, TimeAxis, TimeCue, UidCue
-from elm.interval import AllenRelation, Window
-from elm.storage.cue_compiler import CompiledCue, Condition
+from elm.cues.algebra import And, Cue, Place
+from elm.interval import Window
+from elm.storage.conditions.rule import Condition
+from elm.storage.cue_compiler import CompiledCue
 from elm.storage.tables import event, frame, part
 from elm.store import ByFeature, Grouping, Join, JoinRelation, Nearest, Order, Query
 
@@ -84,7 +85,7 @@ def columns(e: FromClause) -> list[ColumnElement[Any]]:
         e.c.media_type,
         e.c.payload,
         e.c.parts,
-        func.array(wholes.scalar_subquery()),
+        func.array(wholes.scalar_subquery()).label("wholes"),
         e.c.recorded_at,
     ]
 
@@ -212,63 +213,6 @@ def _order(query: Query, e: FromClause) -> list[ColumnElement[Any]]:
 def _ordered(statement: Select[Any], query: Query, e: FromClause, *, after: bool = True) -> Select[Any]:
     ordered = statement.order_by(*_order(query, e))
     return ordered.limit(bindparam("limit", type_=Integer)) if after and query.limit is not None else ordered
-
-
-def is_pinned(cue: Cue) -> bool:
-    """Whether a cue names events or their relatives one by one, so that few can match and an index finds them."""
-    match cue:
-        case And(args=args):
-            return any(map(is_pinned, args))
-        case UidCue() | PayloadCue():
-            return True
-        case KinCue(uids=uids, relation=relation):
-            return bool(uids) and relation in (SetRelation.EQUAL, SetRelation.SUPERSET, SetRelation.INTERSECTS)
-        case _:
-            return False
-
-
-def begins_within(cue: Cue) -> Window:
-    """A window in which every matching event begins, as far as the cue's own conditions on time tell."""
-    match cue:
-        case TimeCue(axis=TimeAxis.TIME, window=window, relation=relation):
-            if relation in _BEGIN_INSIDE:
-                return window
-            return Window(end=window.end) if relation in _BEGIN_UNTIL_END else Window()
-        case And(args=args):
-            windows = [begins_within(arg) for arg in args]
-            begins = [window.begin for window in windows if window.begin is not None]
-            ends = [window.end for window in windows if window.end is not None]
-            first, last = max(begins, default=None), min(ends, default=None)
-            # Conditions that contradict each other match nothing; any window will do.
-            return (
-                Window() if first is not None and last is not None and last < first else Window(begin=first, end=last)
-            )
-        case _:
-            return Window()
-
-
-_BEGIN_INSIDE = frozenset(
-    {
-        SetRelation.EQUAL,
-        SetRelation.SUBSET,
-        AllenRelation.EQUALS,
-        AllenRelation.DURING,
-        AllenRelation.STARTS,
-        AllenRelation.FINISHES,
-        AllenRelation.OVERLAPPED_BY,
-    }
-)
-_BEGIN_UNTIL_END = frozenset(
-    {
-        SetRelation.INTERSECTS,
-        SetRelation.SUPERSET,
-        AllenRelation.BEFORE,
-        AllenRelation.MEETS,
-        AllenRelation.OVERLAPS,
-        AllenRelation.CONTAINS,
-        AllenRelation.FINISHED_BY,
-    }
-)
 
 
 # Sums over what matches

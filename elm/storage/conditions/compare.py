@@ -1,0 +1,24 @@
+"""The comparison operators of features and durations in SQL."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import Any
+
+from sqlalchemy import ColumnElement
+
+from elm.cues.algebra import Comparison
+from elm.storage.conditions.rule import Bind, Condition
+
+COMPARE: Mapping[Comparison, Callable[[ColumnElement[Any], Bind], Condition]] = MappingProxyType(
+    {
+        Comparison.EQ: lambda stored, p: stored == p,
+        Comparison.NE: lambda stored, p: stored != p,
+        Comparison.LT: lambda stored, p: stored < p,
+        Comparison.LE: lambda stored, p: stored <= p,
+        Comparison.GT: lambda stored, p: stored > p,
+        Comparison.GE: lambda stored, p: stored >= p,
+        Comparison.LIKE: lambda stored, p: stored.like(p, escape="\\"),
+    }
+)

@@ -1,0 +1,41 @@
+"""What every condition is made of: the key and values of its SQL, and how to build it from parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from sqlalchemy import ARRAY, TIMESTAMP, ColumnElement, Text, Uuid
+from sqlalchemy.types import TypeEngine
+
+Condition = Any  # a ColumnElement of bool; SQLAlchemy types what operators return as Any
+Bind = ColumnElement[Any]
+
+
+class Names(Protocol):
+    """The numbers that a memory gave to its types and frames."""
+
+    def type_id(self, name: str) -> int:
+        """The number of a type; an unknown one is an error."""
+
+    def frame_id(self, name: str) -> int:
+        """The number of a frame; of an unknown one a number that no event has."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """One condition: what its SQL depends on, the values it binds, and how to build it from their parameters."""
+
+    key: tuple[Any, ...]
+    values: tuple[tuple[Any, TypeEngine[Any]], ...]
+    build: Callable[..., Any]
+    """Takes the table (or an alias of it) whose rows are judged, then one parameter for each value."""
+
+
+TIME = TIMESTAMP(timezone=True)
+"""The type of a parameter that is an instant."""
+TEXTS = ARRAY(Text)
+"""The type of a parameter that is several texts."""
+UIDS = ARRAY(Uuid)
+"""The type of a parameter that is several uids."""

@@ -1,0 +1,105 @@
+"""Conditions on features: whole sets, sets of names, and the comparison of single values."""
+
+from __future__ import annotations
+
+from typing import Any, assert_never
+
+from sqlalchemy import (
+    ARRAY,
+    BigInteger,
+    FromClause,
+    Numeric,
+    Text,
+    and_,
+    any_,
+    case,
+    cast,
+    column,
+    exists,
+    false,
+    func,
+    literal_column,
+    not_,
+    select,
+    true,
+)
+from sqlalchemy.types import TypeEngine
+
+from elm.cues.algebra import Comparison, FeatureCue, FeatureNamesCue, FeaturesCue, SetRelation
+from elm.features import ends_within, fold, kind_of, name_tokens, token, tokens, value_text
+from elm.storage.conditions.compare import COMPARE
+from elm.storage.conditions.rule import TEXTS, Bind, Condition, Rule
+
+
+def feature_names(cue: FeatureNamesCue) -> Rule:
+    """The names of an event's features against a given set."""
+    return _text_set("feature_names", cue.relation, name_tokens(cue.names), "feature_names")
+
+
+def features(cue: FeaturesCue) -> Rule:
+    """An event's set of features against a given set."""
+    given = tokens(cue.features)
+    rule = _text_set("features", cue.relation, given, "feature_tokens")
+    if cue.relation is not SetRelation.SUBSET:
+        return rule
+    # The inverted index would visit all events that share a token, the ends find the few that may lie within;
+    # IS TRUE keeps the planner from taking the former.
+    values = (*rule.values, (ends_within(given), ARRAY(BigInteger)))
+
+    def build(e: FromClause, p: Bind, within: Bind) -> Condition:
+        return and_(rule.build(e, p).is_(true()), e.c.feature_ends == any_(within))
+
+    return Rule(rule.key, values, build)
+
+
+def _text_set(op: str, relation: SetRelation, given: list[str], name: str) -> Rule:
+    values = ((given, TEXTS),)
+
+    def build(e: FromClause, p: Bind) -> Condition:
+        stored = e.c[name]
+        match relation:
+            case SetRelation.EQUAL:
+                return stored == p
+            case SetRelation.SUBSET:
+                return stored.op("<@", is_comparison=True)(p)
+            case SetRelation.SUPERSET:
+                return stored.op("@>", is_comparison=True)(p)
+            case SetRelation.INTERSECTS:
+                return stored.op("&&", is_comparison=True)(p)
+            case SetRelation.DISJOINT:
+                return not_(stored.op("&&", is_comparison=True)(p))
+            case unknown:
+                assert_never(unknown)
+
+    return Rule((op, relation.value), values, build)
+
+
+_JSON_KIND = {"b": "boolean", "n": "number", "s": "string"}
+
+
+def feature(cue: FeatureCue) -> Rule:
+    """Some value of one name against a given value of the same kind."""
+    kind = kind_of(cue.value)
+    key = ("feature", cue.compare.value, kind)
+    if cue.compare is Comparison.EQ:
+        values: tuple[tuple[Any, TypeEngine[Any]], ...] = (([token((cue.name, cue.value))], TEXTS),)
+        return Rule(key, values, lambda e, p: e.c.feature_tokens.op("@>", is_comparison=True)(p))
+    values = (([fold(cue.name)], TEXTS), (cue.name, Text()), (value_text(cue.value), Text()))
+
+    def build(e: FromClause, names: Bind, name: Bind, value: Bind) -> Condition:
+        pair = func.json_array_elements(e.c.features).table_valued(column("value"), name="pair").render_derived()
+        kind_of_pair = func.json_typeof(pair.c.value.op("->")(literal_column("1")))
+        said = pair.c.value.op("->>")(literal_column("1"))
+        named = pair.c.value.op("->>")(literal_column("0")) == name
+        right_kind = kind_of_pair == literal_column(f"'{_JSON_KIND[kind]}'")
+        # Numbers compare as numeric: double precision would merge 2^53 and 2^53 + 1.
+        stored = cast(said, Numeric) if kind == "n" else said.collate("C")
+        given = cast(value, Numeric) if kind == "n" else value
+        # CASE, because AND does not promise to check the kind before it casts.
+        holds = case((and_(named, right_kind), COMPARE[cue.compare](stored, given)), else_=false())
+        return and_(
+            e.c.feature_names.op("@>", is_comparison=True)(names),
+            exists(select(literal_column("1")).select_from(pair).where(holds)),
+        )
+
+    return Rule(key, values, build)

@@ -1,0 +1,142 @@
+"""Conditions on time: windows as ranges that the index understands, Allen's relations literally, durations."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from datetime import timedelta
+from typing import Any, assert_never
+
+from sqlalchemy import ColumnElement, FromClause, Interval, and_, false, func, literal_column, not_, or_, true
+from sqlalchemy.dialects.postgresql import TSTZRANGE
+from sqlalchemy.types import TypeEngine
+
+from elm.cues.algebra import DurationCue, SetRelation, TimeAxis, TimeCue
+from elm.interval import AllenRelation
+from elm.storage.conditions.compare import COMPARE
+from elm.storage.conditions.rule import TIME, Bind, Condition, Rule
+
+_MINUS_INFINITY: Bind = literal_column("'-infinity'::timestamptz")
+_PLUS_INFINITY: Bind = literal_column("'infinity'::timestamptz")
+
+
+def time(cue: TimeCue) -> Rule:
+    """When it happened, or when the memory learned of it, against a window."""
+    bounds = (cue.window.begin, cue.window.end)
+    key = ("time", cue.axis.value, cue.relation.value, *(bound is None for bound in bounds))
+    values = tuple((bound, TIME) for bound in bounds if bound is not None)
+
+    def build(e: FromClause, *binds: Bind) -> Condition:
+        rest = iter(binds)
+        c = _MINUS_INFINITY if bounds[0] is None else next(rest)
+        d = _PLUS_INFINITY if bounds[1] is None else next(rest)
+        if cue.axis is TimeAxis.RECORDED_AT:
+            return _recorded(cue.relation, e.c.recorded_at, c, d)
+        return _during(cue.relation, e.c.period, c, d)
+
+    return Rule(key, values, build)
+
+
+def _range(begin: Bind, end: Bind) -> ColumnElement[Any]:
+    # An unbounded side is NULL to a range; the value 'infinity' would be an instant like any other.
+    lower = literal_column("NULL::timestamptz") if begin is _MINUS_INFINITY else begin
+    upper = literal_column("NULL::timestamptz") if end is _PLUS_INFINITY else end
+    return func.tstzrange(lower, upper, literal_column("'[]'"), type_=TSTZRANGE)
+
+
+def _during(relation: SetRelation | AllenRelation, period: ColumnElement[Any], c: Bind, d: Bind) -> Condition:
+    a: ColumnElement[Any] = func.lower(period)
+    b: ColumnElement[Any] = func.coalesce(func.upper(period), _PLUS_INFINITY)
+    window = _range(c, d)
+    touching = period.op("&&", is_comparison=True)
+    match relation:
+        case SetRelation.EQUAL:
+            return period == window
+        case SetRelation.SUBSET:
+            return period.op("<@", is_comparison=True)(window)
+        case SetRelation.SUPERSET:
+            return period.op("@>", is_comparison=True)(window)
+        case SetRelation.INTERSECTS:
+            return touching(window)
+        case SetRelation.DISJOINT:
+            return not_(touching(window))
+        # The range operators in front of Allen's comparisons are what the GiST index understands.
+        case AllenRelation.BEFORE:
+            return period.op("<<", is_comparison=True)(window)
+        case AllenRelation.AFTER:
+            return a > d
+        case AllenRelation.MEETS:
+            return and_(_at(touching, c), b == c)
+        case AllenRelation.MET_BY:
+            return a == d
+        case AllenRelation.OVERLAPS:
+            return and_(touching(window), a < c, c < b, b < d)
+        case AllenRelation.OVERLAPPED_BY:
+            return and_(touching(window), c < a, a < d, d < b)
+        case AllenRelation.STARTS:
+            return and_(a == c, b < d)
+        case AllenRelation.STARTED_BY:
+            return and_(a == c, b > d)
+        case AllenRelation.DURING:
+            return and_(period.op("<@", is_comparison=True)(window), c < a, b < d)
+        case AllenRelation.CONTAINS:
+            return and_(period.op("@>", is_comparison=True)(window), a < c, d < b)
+        case AllenRelation.FINISHES:
+            return and_(_at(touching, d), b == d, a > c)
+        case AllenRelation.FINISHED_BY:
+            return and_(_at(touching, d), b == d, a < c)
+        case AllenRelation.EQUALS:
+            return period == window
+        case unknown:
+            assert_never(unknown)
+
+
+def _at(touching: Callable[[Any], Condition], moment: Bind) -> Condition:
+    """The events that cover an instant; of an infinite one the condition behind decides alone."""
+    if moment is _MINUS_INFINITY or moment is _PLUS_INFINITY:
+        return true()
+    return touching(_range(moment, moment))
+
+
+def _recorded(relation: SetRelation | AllenRelation, t: ColumnElement[Any], c: Bind, d: Bind) -> Condition:
+    match relation:
+        case SetRelation.EQUAL | SetRelation.SUPERSET | AllenRelation.EQUALS:
+            return and_(t == c, t == d)
+        case SetRelation.SUBSET | SetRelation.INTERSECTS:
+            return and_(t >= c, t <= d)
+        case SetRelation.DISJOINT:
+            return or_(t < c, t > d)
+        case AllenRelation.BEFORE:
+            return t < c
+        case AllenRelation.AFTER:
+            return t > d
+        case AllenRelation.MEETS:
+            return t == c
+        case AllenRelation.MET_BY:
+            return t == d
+        case AllenRelation.OVERLAPS | AllenRelation.OVERLAPPED_BY | AllenRelation.CONTAINS:
+            # An instant has no inside: it neither reaches over an edge nor surrounds anything.
+            return false()
+        case AllenRelation.STARTS:
+            return and_(t == c, t < d)
+        case AllenRelation.STARTED_BY:
+            return and_(t == c, t > d)
+        case AllenRelation.DURING:
+            return and_(t > c, t < d)
+        case AllenRelation.FINISHES:
+            return and_(t == d, t > c)
+        case AllenRelation.FINISHED_BY:
+            return and_(t == d, t < c)
+        case unknown:
+            assert_never(unknown)
+
+
+def duration(cue: DurationCue) -> Rule:
+    """How long it lasted against a given duration."""
+    values: tuple[tuple[timedelta, TypeEngine[Any]], ...] = ((cue.duration, Interval()),)
+    compare = COMPARE[cue.compare]
+    # The upper bound of an open event is NULL: the comparison is not true, as it should be.
+    return Rule(
+        ("duration", cue.compare.value),
+        values,
+        lambda e, p: compare(func.upper(e.c.period) - func.lower(e.c.period), p),
+    )

@@ -1,0 +1,50 @@
+"""Conditions on space: a region or subject against a polygon of the same frame."""
+
+from __future__ import annotations
+
+from typing import Any, assert_never
+
+from geoalchemy2 import Geometry
+from sqlalchemy import ColumnElement, Double, FromClause, Integer, LargeBinary, and_, func
+from sqlalchemy.types import TypeEngine
+
+from elm.cues.algebra import Place, RegionCue
+from elm.geometry import SpatialRelation
+from elm.storage.conditions.rule import Bind, Condition, Names, Rule
+
+
+def region(cue: RegionCue, names: Names) -> Rule:
+    """The region or subject against a polygon of one frame."""
+    frame_id, geometry = ("frame_id", "region") if cue.place is Place.REGION else ("subject_frame_id", "subject")
+    values: tuple[tuple[Any, TypeEngine[Any]], ...] = (
+        (names.frame_id(cue.region.frame), Integer()),
+        (cue.region.wkb, LargeBinary()),
+    )
+    if cue.distance is not None:
+        values = (*values, (cue.distance, Double()))
+
+    def build(e: FromClause, frame: Bind, wkb: Bind, *distance: Bind) -> Condition:
+        given = func.ST_GeomFromWKB(wkb, type_=Geometry)
+        return and_(e.c[frame_id] == frame, _spatial(cue.relation, e.c[geometry], given, *distance))
+
+    return Rule(("region", cue.place.value, cue.relation.value), values, build)
+
+
+def _spatial(relation: SpatialRelation, here: ColumnElement[Any], given: Any, *distance: Bind) -> Any:
+    match relation:
+        case SpatialRelation.EQUAL:
+            return func.ST_Equals(here, given)
+        case SpatialRelation.SUBSET:
+            return func.ST_CoveredBy(here, given)
+        case SpatialRelation.SUPERSET:
+            return func.ST_Covers(here, given)
+        case SpatialRelation.INTERSECTS:
+            return func.ST_Intersects(here, given)
+        case SpatialRelation.DISJOINT:
+            return func.ST_Disjoint(here, given)
+        case SpatialRelation.TOUCHES:
+            return func.ST_Touches(here, given)
+        case SpatialRelation.WITHIN_DISTANCE:
+            return func.ST_DWithin(here, given, *distance)
+        case unknown:
+            assert_never(unknown)

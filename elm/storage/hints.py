@@ -1,0 +1,63 @@
+"""What a cue tells about its answer before it is asked: whether it can only be small, and when its events began."""
+
+from __future__ import annotations
+
+from elm.cues.algebra import And, Cue, KinCue, PayloadCue, SetRelation, TimeAxis, TimeCue, UidCue
+from elm.interval import AllenRelation, Window
+
+
+def is_pinned(cue: Cue) -> bool:
+    """Whether a cue names events or their relatives one by one, so that few can match and an index finds them."""
+    match cue:
+        case And(args=args):
+            return any(map(is_pinned, args))
+        case UidCue() | PayloadCue():
+            return True
+        case KinCue(uids=uids, relation=relation):
+            return bool(uids) and relation in (SetRelation.EQUAL, SetRelation.SUPERSET, SetRelation.INTERSECTS)
+        case _:
+            return False
+
+
+def begins_within(cue: Cue) -> Window:
+    """A window in which every matching event begins, as far as the cue's own conditions on time tell."""
+    match cue:
+        case TimeCue(axis=TimeAxis.TIME, window=window, relation=relation):
+            if relation in _BEGIN_INSIDE:
+                return window
+            return Window(end=window.end) if relation in _BEGIN_UNTIL_END else Window()
+        case And(args=args):
+            windows = [begins_within(arg) for arg in args]
+            begins = [window.begin for window in windows if window.begin is not None]
+            ends = [window.end for window in windows if window.end is not None]
+            first, last = max(begins, default=None), min(ends, default=None)
+            # Conditions that contradict each other match nothing; any window will do.
+            return (
+                Window() if first is not None and last is not None and last < first else Window(begin=first, end=last)
+            )
+        case _:
+            return Window()
+
+
+_BEGIN_INSIDE = frozenset(
+    {
+        SetRelation.EQUAL,
+        SetRelation.SUBSET,
+        AllenRelation.EQUALS,
+        AllenRelation.DURING,
+        AllenRelation.STARTS,
+        AllenRelation.FINISHES,
+        AllenRelation.OVERLAPPED_BY,
+    }
+)
+_BEGIN_UNTIL_END = frozenset(
+    {
+        SetRelation.INTERSECTS,
+        SetRelation.SUPERSET,
+        AllenRelation.BEFORE,
+        AllenRelation.MEETS,
+        AllenRelation.OVERLAPS,
+        AllenRelation.CONTAINS,
+        AllenRelation.FINISHED_BY,
+    }
+)
