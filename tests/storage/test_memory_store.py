@@ -491,7 +491,7 @@ def test_explain_says_what_each_condition_keeps(store: MemoryStore) -> None:
     )
     cue = cues.agent("r") & cues.region("intersects", Region.box(0, 0, 1, 1))
     explained = store.explain(Query(cue=cue))
-    assert (explained.sql, explained.parameters, explained.events) == ("", {}, 1)
+    assert (explained.sql, explained.parameters, explained.events) == ("", {}, 4)
     assert explained.plan == "scan of 2 candidates"
     assert [(row.alone, row.left) for row in explained.conditions] == [(2, 2), (2, 1)]
     assert explained.conditions[0].condition == '{"op":"agent","agent":"r"}'

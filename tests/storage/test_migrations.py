@@ -183,8 +183,8 @@ def test_text_is_ordered_by_code_point(dsn: str) -> None:
         loose = connection.execute(
             "SELECT c.relname, a.attname FROM pg_attribute a JOIN pg_class c ON c.oid = a.attrelid"
             " LEFT JOIN pg_collation l ON l.oid = a.attcollation"
-            " WHERE c.relnamespace = %s::regnamespace AND c.relkind = 'r' AND c.relname <> 'alembic_version' AND a.attnum > 0"
-            " AND a.atttypid IN ('text'::regtype, 'text[]'::regtype, 'varchar'::regtype)"
+            " WHERE c.relnamespace = %s::regnamespace AND c.relkind = 'r' AND c.relname <> 'alembic_version'"
+            " AND a.attnum > 0 AND a.atttypid IN ('text'::regtype, 'text[]'::regtype, 'varchar'::regtype)"
             " AND l.collname IS DISTINCT FROM 'C'",
             [MEMORY],
         ).fetchall()

@@ -1,0 +1,5 @@
+SELECT event.id
+FROM event
+WHERE (event.feature_names @> %(p0)s::TEXT[]) AND (EXISTS (SELECT 1
+FROM json_array_elements(event.features) AS anon_1(value)
+WHERE CASE WHEN ((anon_1.value ->> 0) = %(p1)s::VARCHAR AND json_typeof(anon_1.value -> 1) = 'number') THEN CAST(anon_1.value ->> 1 AS NUMERIC) != CAST(%(p2)s::VARCHAR AS NUMERIC) ELSE false END)) ORDER BY lower(event.period), event.id

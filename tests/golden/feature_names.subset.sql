@@ -1,0 +1,3 @@
+SELECT event.id
+FROM event
+WHERE event.feature_names <@ %(p0)s::TEXT[] ORDER BY lower(event.period), event.id

@@ -1,0 +1,24 @@
+WITH close AS MATERIALIZED
+(SELECT walk.id AS id, walk.period AS period
+FROM (SELECT event.id AS id, event.uid AS uid, event.type_id AS type_id, event.period AS period, event.frame_id AS frame_id, event.region AS region, event.subject_frame_id AS subject_frame_id, event.subject AS subject, event.feature_tokens AS feature_tokens, event.feature_names AS feature_names, event.features AS features, event.agent AS agent, event.media_type AS media_type, event.payload AS payload, event.parts AS parts, event.recorded_at AS recorded_at, event.content AS content, event.feature_ends AS feature_ends
+FROM event ORDER BY lower(event.period), event.id
+ LIMIT %(walk)s::INTEGER) AS walk
+WHERE (walk.feature_names @> %(p0)s::TEXT[]) AND (EXISTS (SELECT 1
+FROM json_array_elements(walk.features) AS anon_1(value)
+WHERE CASE WHEN ((anon_1.value ->> 0) = %(p1)s::VARCHAR AND json_typeof(anon_1.value -> 1) = 'number') THEN CAST(anon_1.value ->> 1 AS NUMERIC) < CAST(%(p2)s::VARCHAR AS NUMERIC) ELSE false END)) ORDER BY lower(walk.period), walk.id
+ LIMIT %(limit)s::INTEGER),
+candidates AS MATERIALIZED
+(SELECT event.id AS id, event.period AS period
+FROM event
+WHERE (SELECT count(*) AS count_1
+FROM close) < %(limit)s::INTEGER AND (event.feature_names @> %(p0)s::TEXT[]) AND (EXISTS (SELECT 1
+FROM json_array_elements(event.features) AS anon_2(value)
+WHERE CASE WHEN ((anon_2.value ->> 0) = %(p1)s::VARCHAR AND json_typeof(anon_2.value -> 1) = 'number') THEN CAST(anon_2.value ->> 1 AS NUMERIC) < CAST(%(p2)s::VARCHAR AS NUMERIC) ELSE false END)))
+ SELECT ids.id
+FROM (SELECT close.id AS id, close.period AS period
+FROM close
+WHERE (SELECT count(*) AS count_1
+FROM close) >= %(limit)s::INTEGER UNION ALL SELECT sorted.id AS id, sorted.period AS period
+FROM (SELECT candidates.id AS id, candidates.period AS period
+FROM candidates ORDER BY lower(candidates.period), candidates.id
+ LIMIT %(limit)s::INTEGER) AS sorted) AS ids ORDER BY lower(ids.period), ids.id

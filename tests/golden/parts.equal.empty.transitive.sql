@@ -1,0 +1,5 @@
+SELECT event.id
+FROM event
+WHERE NOT (EXISTS (SELECT 1
+FROM part
+WHERE part.whole_id = event.id)) ORDER BY lower(event.period), event.id

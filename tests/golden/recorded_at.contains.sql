@@ -1,0 +1,3 @@
+SELECT event.id
+FROM event
+WHERE false ORDER BY lower(event.period), event.id

@@ -1,0 +1,3 @@
+SELECT event.id
+FROM event
+WHERE event.frame_id = %(p0)s::INTEGER AND ST_DWithin(event.region, ST_GeomFromWKB(%(p1)s), %(p2)s) ORDER BY lower(event.period), event.id

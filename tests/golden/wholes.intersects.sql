@@ -1,0 +1,8 @@
+SELECT event.id
+FROM event
+WHERE event.id IN (SELECT reached.own_id
+FROM (SELECT part.part_id AS own_id, part.whole_id AS start_id
+FROM part
+WHERE part.whole_id IN (SELECT other.id
+FROM event AS other
+WHERE other.uid = ANY (%(p0)s::UUID[]))) AS reached) ORDER BY lower(event.period), event.id

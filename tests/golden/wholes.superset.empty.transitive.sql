@@ -1,0 +1,3 @@
+SELECT event.id
+FROM event
+WHERE true ORDER BY lower(event.period), event.id
