@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 from enum import StrEnum
@@ -257,9 +257,6 @@ class Store(Protocol):
 
     def load(self, arrivals: Sequence[Arrival]) -> BatchReport:
         """Keep what can be kept of a batch whose parts come before their wholes or are in the memory."""
-
-    def load_all(self, batches: Iterable[Sequence[Arrival]]) -> Iterator[BatchReport]:
-        """Load batches in turn, each in a transaction of its own; one report each, in order."""
 
     def finish_load(self) -> None:
         """Bring the store's statistics up to date after a load."""

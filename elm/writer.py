@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from datetime import datetime
@@ -12,8 +11,8 @@ from elm.event import Event
 from elm.interval import as_utc
 from elm.store import Arrival, Closed, Committed, Store
 
-LOAD_BATCH = 1_000
-"""Events of a load that are kept in one transaction; the next batch is encoded while the database takes one in."""
+LOAD_BATCH = 5_000
+"""Events of a load that are kept in one transaction."""
 BATCH_BYTES = 64 * 1024 * 1024
 """Bytes of payload after which a batch is not filled further: it is in memory as a whole."""
 
@@ -67,15 +66,8 @@ class Writer:
         `progress` is told the number of events dealt with so far, after every batch.
         """
         read = new = existing = refusals = 0
-        under_way: deque[list[Arrival]] = deque()
-
-        def batches() -> Iterator[list[Arrival]]:
-            for chunk in _batches(events, batch):
-                under_way.append(chunk)
-                yield chunk
-
-        for report in self._store.load_all(batches()):
-            chunk = under_way.popleft()
+        for chunk in _batches(events, batch):
+            report = self._store.load(chunk)
             read += len(chunk)
             new += report.new
             existing += report.existing

@@ -1,163 +1,107 @@
-"""Loading a batch by COPY: into a temporary table, from there level by level into the memory, refusals told apart."""
+"""Loading a batch by COPY: atomic events at once, complex ones level by level, refusals told apart."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
-from datetime import UTC, datetime
 from uuid import UUID
 
+import psycopg
+
 from elm.errors import ConflictingContent
-from elm.event import Event, StoredEvent, content_hash
+from elm.event import StoredEvent
 from elm.storage import encoding
 from elm.storage import write_statements as sql
+from elm.storage.batch import Batch, parts_to_come
 from elm.storage.connections import Connection
-from elm.storage.event_writing import encoded, refuse_other, why_refused
-from elm.storage.names import NameCache
-from elm.store import Arrival, BatchReport, Refusal
-
-
-def levels(events: Sequence[Event]) -> list[int]:
-    """How many steps each event stands above those of the batch that come before it and are its parts."""
-    level: dict[UUID, int] = {}
-    found = []
-    for event in events:
-        height = 1 + max((level.get(part, 0) for part in event.parts), default=-1) if event.parts else 0
-        level.setdefault(event.uid, height)
-        found.append(height)
-    return found
-
-
-def repeated(arrivals: Sequence[Arrival]) -> tuple[dict[int, str], set[int]]:
-    """The rows of a batch whose uid stands earlier in it: those with other content, with a reason, and the rest."""
-    first: dict[UUID, Event] = {}
-    other: dict[int, str] = {}
-    same: set[int] = set()
-    for index, arrival in enumerate(arrivals):
-        known = first.setdefault(arrival.event.uid, arrival.event)
-        if known is arrival.event:
-            continue
-        if content_hash(known) == content_hash(arrival.event):
-            same.add(index)
-        else:
-            other[index] = f"the uid {known.uid} stands earlier with other content: give one of them a new uid"
-    return other, same
-
-
-def parts_to_come(arrivals: Sequence[Arrival]) -> dict[int, set[UUID]]:
-    """For each row the parts that stand only later in the batch."""
-    place = {arrival.event.uid: index for index, arrival in reversed(list(enumerate(arrivals)))}
-    found = {
-        index: {part for part in arrival.event.parts if place.get(part, -1) > index}
-        for index, arrival in enumerate(arrivals)
-        if arrival.event.parts
-    }
-    return {index: parts for index, parts in found.items() if parts}
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Batch:
-    """A batch made ready to be sent: what is refused already, and the rest as the bytes of a binary COPY."""
-
-    arrivals: Sequence[Arrival]
-    now: datetime
-    heights: list[int]
-    refused: dict[int, str]
-    repeats: set[int]
-    kept: list[int]
-    copy: bytes
-
-
-def made_ready(arrivals: Sequence[Arrival], names: NameCache) -> Batch:
-    """What can be done for a batch without waiting for the database, but for names it has not seen yet."""
-    now = datetime.now(UTC)
-    refused, repeats = repeated(arrivals)
-    types = names.known_type_ids([arrival.event.type for arrival in arrivals])
-    for index, arrival in enumerate(arrivals):
-        if arrival.event.type not in types:
-            refused[index] = f"unknown event type {arrival.event.type!r}: add it first (`elm types add`)"
-    kept = [index for index in range(len(arrivals)) if index not in refused and index not in repeats]
-    heights = levels([arrival.event for arrival in arrivals])
-    rows = encoded([arrivals[index] for index in kept], names, now)
-    count = 2 + len(encoding.COLUMNS)
-    copied = [
-        encoding.copied((encoding.int4(index), encoding.int4(heights[index]), *row), count)
-        for index, row in zip(kept, rows, strict=True)
-    ]
-    copy = b"".join([encoding.COPY_BEGIN, *copied, encoding.COPY_END])
-    return Batch(arrivals=arrivals, now=now, heights=heights, refused=refused, repeats=repeats, kept=kept, copy=copy)
-
-
-def stage(connection: Connection, batch: Batch) -> None:
-    """Copy a batch into the temporary table, under the rows' index in it and with their level."""
-    connection.execute(sql.CREATE_STAGING)
-    with connection.cursor().copy(sql.COPY_STAGING) as copy:
-        copy.write(batch.copy)
-
-
-def existing(connection: Connection) -> list[tuple[int, int, bool]]:
-    """Row, id, and whether the content is the same, of staged rows whose uid is in the memory."""
-    return connection.execute(sql.STAGED_EXISTING).fetchall()
-
-
-def drop(connection: Connection, indexes: Sequence[int]) -> None:
-    """Take rows out of the temporary table."""
-    if indexes:
-        connection.execute(sql.DROP_STAGED, {"rows": list(indexes)})
-
-
-def insert(connection: Connection, *, highest: int, now: datetime) -> dict[UUID, bool]:
-    """Move the staged rows into the memory, lowest level first; uid -> whether it was there already."""
-    taken = list(connection.execute(sql.LOAD_ATOMIC, {"now": now}, binary=True))
-    if highest:
-        connection.execute(sql.LOCK_OPEN_PARTS)
-    for level in range(1, highest + 1):
-        taken += connection.execute(sql.LOAD_LEVEL, {"level": level, "now": now}, binary=True)
-    return {UUID(bytes=uid): existed for uid, existed in taken}
-
+from elm.storage.event_writing import refuse_other, why_refused
+from elm.store import BatchReport, Refusal
 
 Stored = Callable[[Sequence[UUID]], Iterable[StoredEvent]]
 """Gives the events of some uids, as the loading transaction sees them."""
 
+_ATTEMPTS = 10
+"""How often a batch is begun anew because another process was committing one of its events."""
+_CONTENT = encoding.COLUMNS.index("content")
+
 
 def load(connection: Connection, batch: Batch, stored: Stored) -> BatchReport:
-    """Keep what can be kept of a batch, in the transaction that the connection is in."""
-    arrivals, refused = batch.arrivals, batch.refused
-    taken: dict[UUID, bool] = {}
-    if batch.kept:
-        stage(connection, batch)
-        present = _set_aside(connection, batch, stored)
-        taken = insert(connection, highest=max(batch.heights), now=batch.now)
-        for index in batch.kept:
-            event = arrivals[index].event
-            if index not in present and index not in refused and event.uid not in taken:
-                refused[index] = str(why_refused(event, stored(event.parts)))
-    lost = {arrivals[index].event.uid for index in refused}
-    doubles = {index for index in batch.repeats if arrivals[index].event.uid in lost}
+    """Keep what can be kept of a batch, in one transaction."""
+    for attempt in range(_ATTEMPTS):
+        try:
+            with connection.transaction():
+                return _load(connection, batch, stored)
+        except psycopg.errors.UniqueViolation:
+            # COPY cannot pass over a uid that another process committed since we looked; next time we see it.
+            if attempt == _ATTEMPTS - 1:
+                raise
+    raise AssertionError("the last attempt returns or raises")
+
+
+def _load(connection: Connection, batch: Batch, stored: Stored) -> BatchReport:
+    refused = dict(batch.refused)
+    fresh = _fresh(connection, batch, stored, refused)
+    taken = _copy_atomic(connection, batch, [index for index in fresh if batch.heights[index] == 0])
+    complex_ones = [index for index in fresh if batch.heights[index] > 0]
+    if complex_ones:
+        taken |= _insert_complex(connection, batch, complex_ones)
+    for index in complex_ones:
+        event = batch.arrivals[index].event
+        if event.uid not in taken:
+            refused[index] = str(why_refused(event, stored(event.parts)))
+    lost = {batch.arrivals[index].event.uid for index in refused.keys() & batch.rows.keys()}
+    doubles = {index for index in batch.repeats if batch.arrivals[index].event.uid in lost}
     refused |= dict.fromkeys(doubles, "the same event was refused earlier in this batch")
-    new = sum(not existed for existed in taken.values())
     reasons = tuple(Refusal(index=index, reason=refused[index]) for index in sorted(refused))
-    return BatchReport(new=new, existing=len(arrivals) - new - len(reasons), refused=reasons)
+    existing = len(batch.arrivals) - len(taken) - len(reasons)
+    return BatchReport(new=len(taken), existing=existing, refused=reasons)
 
 
-def _set_aside(connection: Connection, batch: Batch, stored: Stored) -> set[int]:
-    """Take the staged rows out that are in the memory (returned) and those that cannot be kept."""
-    arrivals, refused = batch.arrivals, batch.refused
-    found = existing(connection)
-    present = {index for index, _, _ in found}
-    for index, _, same in found:
+def _fresh(connection: Connection, batch: Batch, stored: Stored, refused: dict[int, str]) -> list[int]:
+    """The rows that are to be written: not in the memory yet, nor of other content, nor before their parts."""
+    arrivals = batch.arrivals
+    uids = [arrivals[index].event.uid for index in batch.rows]
+    known = {UUID(bytes=uid): content for uid, content in connection.execute(sql.CONTENTS, [uids], binary=True)}
+    present = [index for index in batch.rows if arrivals[index].event.uid in known]
+    for index in present:
         event = arrivals[index].event
-        if not same:
+        if known[event.uid] != batch.rows[index][_CONTENT]:
             try:
                 refuse_other(event, next(iter(stored([event.uid]))))
             except ConflictingContent as error:
                 refused[index] = str(error)
-    kept = set(batch.kept)
-    later = {index: parts for index, parts in parts_to_come(arrivals).items() if index in kept}
-    known = {each.uid for each in stored([uid for parts in later.values() for uid in parts])}
+    later = {index: parts for index, parts in parts_to_come(arrivals).items() if index in batch.rows}
+    here = {each.uid for each in stored([uid for parts in later.values() for uid in parts])}
     for index, parts in later.items():
-        if index not in present and (missing := parts - known):
+        if arrivals[index].event.uid not in known and (missing := parts - here):
             named = ", ".join(sorted(map(str, missing))[:5])
             refused[index] = f"its parts {named} stand later in the load: move the whole behind them"
-    drop(connection, sorted(present | (kept & refused.keys())))
-    return present
+    return [index for index in batch.rows if arrivals[index].event.uid not in known and index not in refused]
+
+
+def _copy_atomic(connection: Connection, batch: Batch, indexes: list[int]) -> set[UUID]:
+    if not indexes:
+        return set()
+    count = len(encoding.COLUMNS)
+    _copy(connection, sql.COPY_EVENTS, [encoding.copied(batch.rows[index], count) for index in indexes])
+    uids = [batch.arrivals[index].event.uid for index in indexes]
+    connection.execute(sql.LOG_COPIED, {"uids": uids, "now": batch.now})
+    return set(uids)
+
+
+def _insert_complex(connection: Connection, batch: Batch, indexes: list[int]) -> set[UUID]:
+    connection.execute(sql.CREATE_STAGING)
+    count = 2 + len(encoding.COLUMNS)
+    places = {index: (encoding.int4(index), encoding.int4(batch.heights[index])) for index in indexes}
+    rows = [encoding.copied((*places[index], *batch.rows[index]), count) for index in indexes]
+    _copy(connection, sql.COPY_STAGING, rows)
+    connection.execute(sql.LOCK_OPEN_PARTS)
+    taken: set[UUID] = set()
+    for level in sorted({batch.heights[index] for index in indexes}):
+        found = connection.execute(sql.LOAD_LEVEL, {"level": level, "now": batch.now}, binary=True)
+        taken |= {UUID(bytes=uid) for (uid,) in found}
+    return taken
+
+
+def _copy(connection: Connection, statement: str, rows: list[bytes]) -> None:
+    with connection.cursor().copy(statement) as copy:
+        copy.write(b"".join([encoding.COPY_BEGIN, *rows, encoding.COPY_END]))

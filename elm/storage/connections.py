@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import select
 import weakref
 from collections import deque
 from collections.abc import Iterator
@@ -32,6 +34,8 @@ _SESSION = {
     "TimeZone": "UTC",
     "jit": "off",
     "random_page_cost": "1.1",
+    # The locks that writers take are only right where each statement sees what was committed before it.
+    "default_transaction_isolation": "read committed",
     "work_mem": "64MB",
 }
 # The write statements are always the same plan; finding it anew would cost more than running it.
@@ -83,10 +87,13 @@ def _translate(error: psycopg.Error, memory: str) -> ElmError:
 def open_connection(dsn: str, settings: dict[str, str], *, memory: str | None = None) -> Connection:
     """A connection in autocommit mode whose search_path leads into `memory`."""
     try:
-        connection = psycopg.connect(dsn, autocommit=True, fallback_application_name="elm")
+        _check_password(dsn)
+        connection = psycopg.connect(dsn, autocommit=True, fallback_application_name="elm", client_encoding="UTF8")
     except psycopg.ProgrammingError as error:
+        # libpq repeats what it does not understand, which may be the password or a part of it.
+        said = "it cannot be parsed" if _PASSWORD.search(dsn) else str(error).strip()
         raise DatabaseUnreachable(
-            f"this is not a PostgreSQL DSN: {str(error).strip()}. Write it like postgresql://user@host:5432/database"
+            f"this is not a PostgreSQL DSN: {said}. Write it like postgresql://user@host:5432/database"
         ) from error
     except psycopg.OperationalError as error:
         raise _unreachable(dsn, error) from error
@@ -94,6 +101,12 @@ def open_connection(dsn: str, settings: dict[str, str], *, memory: str | None = 
         version = connection.info.parameter_status("server_version")
         connection.close()
         raise DatabaseUnfit(f"PostgreSQL {version} is too old: elm needs {MINIMUM_SERVER} or newer")
+    if (encoding := connection.info.parameter_status("server_encoding")) != "UTF8":
+        connection.close()
+        raise DatabaseUnfit(
+            f"the database has the encoding {encoding}, which cannot hold every text: "
+            f"elm needs one made by CREATE DATABASE ... ENCODING 'UTF8' TEMPLATE template0"
+        )
     with translated(memory or ""):
         # PostGIS may live in any schema: find it, for the memory's own must come first in the path.
         row = connection.execute(
@@ -113,6 +126,21 @@ def open_connection(dsn: str, settings: dict[str, str], *, memory: str | None = 
     for oid in _RAW_OIDS:
         connection.adapters.register_loader(oid, ByteaBinaryLoader)
     return connection
+
+
+_PASSWORD = re.compile(r"://[^/@]*:.*@|\bpassword", re.DOTALL)
+"""What tells that there is a password in a DSN, in any of its forms, also in one that libpq cannot parse."""
+
+
+def _check_password(dsn: str) -> None:
+    """Refuse a URI whose password libpq would take for a host, a port or a database, and show as such."""
+    known = psycopg.conninfo.conninfo_to_dict(dsn)
+    # An @ in front is an abstract socket.
+    if "@" in str(known.get("host", ""))[1:] or not str(known.get("port") or 1).replace(",", "").isdigit():
+        raise DatabaseUnreachable(
+            "this is not a PostgreSQL DSN: host and port cannot be told apart from a password. "
+            "In a URI write %40 for @, %2F for /, %3A for : and %25 for % in a password"
+        )
 
 
 def _unreachable(dsn: str, error: psycopg.OperationalError) -> ElmError:
@@ -151,7 +179,7 @@ class Connections:
         """The connection that writes, one caller at a time."""
         with self._write_lock:
             self._check_open()
-            if self._writing is None or self._writing.closed:
+            if self._writing is None or _is_lost(self._writing):
                 self._writing = self._open(WRITING)
             with translated(self._memory):
                 yield self._writing
@@ -162,7 +190,7 @@ class Connections:
         self._check_open()
         with self._lock:
             connection = self._idle.pop() if self._idle else None
-        if connection is None or connection.closed:
+        if connection is None or _is_lost(connection):
             connection = self._open(RECALLING)
         try:
             with translated(self._memory):
@@ -187,6 +215,18 @@ class Connections:
                 self._idle.pop().close()
         if self._writing is not None:
             self._writing.close()
+
+
+def _is_lost(connection: Connection) -> bool:
+    """Whether the server hung up: an idle connection has nothing to read but its last words, or their end."""
+    if connection.closed:
+        return True
+    poll = select.poll()
+    poll.register(connection.fileno(), select.POLLIN)
+    if not poll.poll(0):
+        return False
+    connection.close()
+    return True
 
 
 def _close_all(connections: WeakSet[Connection]) -> None:

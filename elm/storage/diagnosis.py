@@ -44,9 +44,9 @@ def diagnose(dsn: str | None, memory: str) -> list[tuple[str, str]]:
         chosen = resolve_dsn(dsn)
     except ElmError as error:
         return [("DSN", f"FAILED: {error}")]
-    lines.append(("DSN", masked(chosen)))
     if chosen == IN_PROCESS:
-        return [*lines, ("store", "in this process, nothing to diagnose")]
+        return [("DSN", chosen), ("store", "in this process, nothing to diagnose")]
+    lines.append(("DSN", masked(chosen)))
     try:
         connection = open_connection(chosen, RECALLING, memory=memory)
     except ElmError as error:
@@ -61,7 +61,12 @@ def diagnose(dsn: str | None, memory: str) -> list[tuple[str, str]]:
 
 def masked(dsn: str) -> str:
     """A DSN without its password, in either of libpq's two forms."""
-    without = re.sub(r"(://[^:/@]*):[^@]*@", r"\1:***@", dsn)
+    try:
+        psycopg.conninfo.conninfo_to_dict(dsn)
+    except psycopg.ProgrammingError:
+        # Where its parts cannot be told apart, any of them may be the password.
+        return "not shown, for it is none"
+    without = re.sub(r"(://[^:/@]*):.*@", r"\1:***@", dsn)
     without = re.sub(r"([?&](?:password|sslpassword)=)[^&]*", r"\1***", without)
     return re.sub(r"\b(password|sslpassword)\s*=\s*('(?:[^'\\]|\\.)*'|\S+)", r"\1=***", without)
 

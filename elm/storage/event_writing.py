@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime
+from heapq import heapify, heappop, heappush
 from uuid import UUID
 
 from elm.errors import ConflictingContent, CycleRefused, ExtentRefused, InvalidValue, UnknownEvent
@@ -98,10 +99,18 @@ def close(connection: Connection, uid: UUID, end: datetime) -> Closed | None:
     number, agent = row
     log = [{"id": number, "agent": agent, "now": now}]
     closed: list[UUID] = []
-    for whole, whole_uid, was_open in connection.execute(sql.LOCK_WHOLES, {"id": number}, binary=True):
-        found = connection.execute(sql.RECOMPUTE_WHOLE, {"id": whole}).fetchone()
-        assert found is not None  # noqa: S101 - the row is locked
-        still_open, whole_agent = found
+    above = [whole for (whole,) in connection.execute(sql.WHOLES_OF, {"id": number})]
+    heapify(above)
+    done = 0
+    while above:
+        whole = heappop(above)
+        if whole == done:
+            continue
+        done = whole
+        ((whole_uid, was_open),) = connection.execute(sql.LOCK_WHOLE, {"id": whole}, binary=True).fetchall()
+        ((still_open, whole_agent, further),) = connection.execute(sql.RECOMPUTE_WHOLE, {"id": whole}).fetchall()
+        for each in further:
+            heappush(above, each)
         if was_open and not still_open:
             closed.append(UUID(bytes=whole_uid))
             log.append({"id": whole, "agent": whole_agent, "now": now})

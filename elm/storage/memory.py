@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from datetime import datetime
 from itertools import islice
@@ -104,10 +104,6 @@ class MemoryStore:
         contents = [content_hash(arrival.event) for arrival in arrivals]
         with self._locked():
             return self._changes.load(arrivals, contents)
-
-    def load_all(self, batches: Iterable[Sequence[Arrival]]) -> Iterator[BatchReport]:
-        """Load batches in turn."""
-        return map(self.load, batches)
 
     def finish_load(self) -> None:
         """Nothing is left to do after a load."""

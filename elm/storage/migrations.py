@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from threading import Lock
+
 import psycopg
 from alembic.config import Config
 from sqlalchemy import Connection as SqlConnection
@@ -15,6 +17,7 @@ from elm.storage.schema import EXTENSIONS, check_memory_name, check_revision, ol
 from elm.storage.tables import REVISION
 
 _LOCK = 0x656C6D  # "elm": creating and migrating memories of one database take turns
+_ALONE = Lock()  # alembic keeps the connection that it works on in a global of the process
 
 
 def migrate(dsn: str, memory: str) -> str:
@@ -46,7 +49,7 @@ def _migrate(transaction: SqlConnection, memory: str) -> str:
         return f"memory {memory!r} is up to date (schema {REVISION})"
     if before is None:
         _provide_extensions(driver)
-        driver.execute(psycopg.sql.SQL("CREATE SCHEMA IF NOT EXISTS {}").format(psycopg.sql.Identifier(memory)))
+        _provide_schema(driver, memory)
     elif before not in older_revisions():
         check_revision(before, memory)
     homes = driver.execute(
@@ -57,11 +60,25 @@ def _migrate(transaction: SqlConnection, memory: str) -> str:
     path = psycopg.sql.SQL(", ").join(psycopg.sql.Identifier(name) for name in (memory, *(row[0] for row in homes)))
     driver.execute(psycopg.sql.SQL("SET LOCAL search_path = {}").format(path))
     config = _config()
-    config.attributes["connection"] = transaction
-    command.upgrade(config, "head")
+    config.attributes.update(connection=transaction, memory=memory)
+    with _ALONE:
+        command.upgrade(config, "head")
     if before is None:
         return f"created memory {memory!r} (schema {REVISION})"
     return f"migrated memory {memory!r} from schema {before} to {REVISION}"
+
+
+def _provide_schema(driver: Connection, memory: str) -> None:
+    # Whoever was given an empty schema may lack the right to create one.
+    if driver.execute("SELECT FROM pg_namespace WHERE nspname = %s", [memory]).rowcount == 0:
+        driver.execute(psycopg.sql.SQL("CREATE SCHEMA {}").format(psycopg.sql.Identifier(memory)))
+        return
+    tables = "SELECT FROM pg_class c JOIN pg_namespace n ON n.oid = c.relnamespace WHERE n.nspname = %s"
+    if driver.execute(tables, [memory]).rowcount:
+        raise DatabaseUnfit(
+            f"the database has a schema {memory!r} that is no memory and has tables of its own: "
+            f"choose another name for the memory"
+        )
 
 
 def _provide_extensions(driver: Connection) -> None:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Callable, Iterator, Sequence
 from datetime import UTC, datetime
 from functools import partial
 from itertools import islice
@@ -20,7 +19,7 @@ from elm.exchange import to_line
 from elm.interval import Window
 from elm.storage import batch_loading, event_writing, grouping, hints, recall_statements, schema, type_writing
 from elm.storage import write_statements as sql
-from elm.storage.batch_loading import Batch
+from elm.storage.batch import made_ready
 from elm.storage.connections import Connection, Connections
 from elm.storage.cue_compiler import CompiledCue, compile_cue
 from elm.storage.names import NameCache
@@ -112,23 +111,11 @@ class PostgresStore:
 
     def load(self, arrivals: Sequence[Arrival]) -> BatchReport:
         """Keep what can be kept of a batch whose parts come before their wholes or are in the memory."""
-        return next(self.load_all([arrivals]))
-
-    def load_all(self, batches: Iterable[Sequence[Arrival]]) -> Iterator[BatchReport]:
-        """Load batches in turn; while the database takes one in, the next is made ready."""
         self._ready_to_write()
-        with ThreadPoolExecutor(max_workers=1, thread_name_prefix="elm-load") as worker:
-            running: Future[BatchReport] | None = None
-            for arrivals in batches:
-                batch = batch_loading.made_ready(arrivals, self._names)
-                if running is not None:
-                    yield running.result()
-                running = worker.submit(self._load, batch)
-            if running is not None:
-                yield running.result()
-
-    def _load(self, batch: Batch) -> BatchReport:
-        with self._connections.writing() as connection, connection.transaction():
+        if not arrivals:
+            return BatchReport(new=0, existing=0, refused=())
+        batch = made_ready(arrivals, self._names)
+        with self._connections.writing() as connection:
             return batch_loading.load(connection, batch, partial(self._stored, connection))
 
     def finish_load(self) -> None:

@@ -36,5 +36,7 @@ def run(connection: Connection, name: str, statement: str, values: Sequence[byte
 
 def _check(result: PGresult, connection: Connection) -> PGresult:
     if result.status not in (ExecStatus.COMMAND_OK, ExecStatus.TUPLES_OK):
-        raise errors.error_from_result(result, encoding=connection.info.encoding)
+        error = errors.error_from_result(result, encoding=connection.info.encoding)
+        # Of a connection that broke libpq has no SQLSTATE, from which the driver would choose the class.
+        raise errors.OperationalError(str(error)) if connection.closed else error
     return result

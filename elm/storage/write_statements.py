@@ -87,8 +87,17 @@ WITH g AS (
 SELECT id, existed FROM new
 """)
 
-# Loading: a batch is copied into a temporary table and goes from there into the memory, level by level,
-# for a statement does not see the rows it inserts itself.
+# Loading: atomic events are copied into the table; complex ones into a temporary table, and go from there
+# level by level, for a statement does not see the rows it inserts itself.
+
+CONTENTS = "SELECT uid, content FROM event WHERE uid = ANY(%s)"
+
+COPY_EVENTS = _filled("COPY event (<columns>) FROM STDIN (FORMAT BINARY)")
+
+LOG_COPIED = _filled("""
+INSERT INTO log_inbox (event_id, kind, agent, at)
+SELECT id, <commit>, agent, %(now)s FROM event WHERE uid = ANY(%(uids)s) ORDER BY id
+""")
 
 CREATE_STAGING = """
 CREATE TEMPORARY TABLE IF NOT EXISTS staging (
@@ -100,25 +109,6 @@ CREATE TEMPORARY TABLE IF NOT EXISTS staging (
 """
 
 COPY_STAGING = "COPY staging FROM STDIN (FORMAT BINARY)"
-
-STAGED_EXISTING = """
-SELECT s.row, e.id, e.content = s.content AS same FROM staging s JOIN event e USING (uid)
-"""
-
-DROP_STAGED = "DELETE FROM staging WHERE row = ANY(%(rows)s)"
-
-LOAD_ATOMIC = _filled("""
-WITH new AS (
-    INSERT INTO event (<columns>)
-    SELECT <columns> FROM staging WHERE level = 0 ORDER BY row
-    ON CONFLICT (uid) DO UPDATE SET uid = excluded.uid WHERE event.content = excluded.content
-    RETURNING id, uid, agent, xmax <> 0 AS existed
-), logged AS (
-    INSERT INTO log_inbox (event_id, kind, agent, at)
-    SELECT id, <commit>, agent, %(now)s FROM new WHERE NOT existed ORDER BY id
-)
-SELECT uid, existed FROM new
-""")
 
 LOCK_OPEN_PARTS = """
 SELECT id FROM event
@@ -141,24 +131,24 @@ WITH p AS MATERIALIZED (
     FROM staging s JOIN x ON x.row = s.row
     WHERE s.level = %(level)s AND x.found = cardinality(s.parts) AND <agrees s.>
     ORDER BY s.row
-    ON CONFLICT (uid) DO UPDATE SET uid = excluded.uid WHERE event.content = excluded.content
-    RETURNING id, uid, agent, xmax <> 0 AS existed
+    RETURNING id, uid, agent
 ), linked AS (
     INSERT INTO part (whole_id, part_id, ordinal, whole_uid)
     SELECT new.id, p.id, p.ordinal, new.uid
     FROM new JOIN staging s ON s.uid = new.uid JOIN p ON p.row = s.row
-    WHERE NOT new.existed
 ), logged AS (
     INSERT INTO log_inbox (event_id, kind, agent, at)
-    SELECT id, <commit>, agent, %(now)s FROM new WHERE NOT existed ORDER BY id
+    SELECT id, <commit>, agent, %(now)s FROM new ORDER BY id
 )
-SELECT uid, existed FROM new
+SELECT uid FROM new
 """)
 
 ANALYZE = "ANALYZE event, part, event_type, type_closure"
 
-# Closing: the event first; then, in later statements that see what others committed meanwhile, its
-# wholes, locked in id order and recomputed in that order, for parts have smaller ids than their wholes.
+# Closing: the event first; then, each in later statements that see what others committed meanwhile, its wholes
+# and theirs, the smallest id next. Parts have smaller ids than their wholes: so each is recomputed after all below
+# it, and locked in the order in which all writers lock. Only of a locked whole is it certain which wholes it has:
+# whoever commits one more locks its parts first.
 
 CLOSE_EVENT = """
 UPDATE event SET period = tstzrange(lower(period), %(end)s, '[]')
@@ -166,20 +156,16 @@ WHERE uid = %(uid)s AND upper_inf(period) AND parts = '{}' AND lower(period) <= 
 RETURNING id, agent
 """
 
-LOCK_WHOLES = """
-WITH RECURSIVE above AS (
-    SELECT whole_id FROM part WHERE part_id = %(id)s
-    UNION SELECT part.whole_id FROM part JOIN above ON part.part_id = above.whole_id
-)
-SELECT id, uid, upper_inf(period) AS was_open FROM event WHERE id IN (SELECT whole_id FROM above)
-ORDER BY id FOR UPDATE
-"""
+WHOLES_OF = "SELECT whole_id FROM part WHERE part_id = %(id)s"
+
+LOCK_WHOLE = "SELECT uid, upper_inf(period) AS was_open FROM event WHERE id = %(id)s FOR UPDATE"
 
 RECOMPUTE_WHOLE = """
 UPDATE event SET period = (
     SELECT range_merge(range_agg(p.period)) FROM part l JOIN event p ON p.id = l.part_id WHERE l.whole_id = event.id
 )
-WHERE id = %(id)s RETURNING upper_inf(period), agent
+WHERE id = %(id)s
+RETURNING upper_inf(period), agent, ARRAY(SELECT whole_id FROM part WHERE part_id = event.id)
 """
 
 LOG_CLOSED = _filled("INSERT INTO log_inbox (event_id, kind, agent, at) VALUES (%(id)s, <close>, %(agent)s, %(now)s)")

@@ -565,6 +565,7 @@ def test_an_explanation_counts_what_each_condition_keeps(
 
     explanation = store.explain(Query(cue=cue))
     assert explanation.plan
+    assert explanation.events == len(model.events)
     assert explanation.conditions
     assert explanation.conditions[-1].left == len(model.scan(cue))
     left = [condition.left for condition in explanation.conditions]

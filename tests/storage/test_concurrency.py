@@ -9,11 +9,12 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 from functools import partial
 from threading import Barrier
-from typing import Any
+from typing import Any, LiteralString
 from uuid import uuid4
 
 import psycopg
 import pytest
+from psycopg import sql
 
 from elm import cues
 from elm.errors import ConflictingContent, CycleRefused, InvalidValue, UnknownEvent
@@ -39,6 +40,20 @@ def arrivals(*events: Event) -> list[Arrival]:
     return [Arrival(event=event) for event in events]
 
 
+_WAITING = """
+SELECT count(*) FROM pg_stat_activity WHERE datname = current_database() AND wait_event_type = 'Lock'
+"""
+_OPEN_FOR_EVER = """
+SELECT count(*) FROM event w WHERE parts <> '{}' AND upper_inf(period) AND NOT EXISTS (
+    SELECT 1 FROM part JOIN event p ON p.id = part_id WHERE whole_id = w.id AND upper_inf(p.period)
+)
+"""
+_CLOSURE = """
+SELECT a.name, d.name FROM type_closure
+JOIN event_type a ON a.id = ancestor_id JOIN event_type d ON d.id = descendant_id
+"""
+
+
 class Robots:
     """One memory, written to over several connections, and looked at from outside."""
 
@@ -46,11 +61,12 @@ class Robots:
         # A writer that waits for ever is a failure, not a hanging test.
         self._dsn = psycopg.conninfo.make_conninfo(dsn, options="-c lock_timeout=20s")
         self._opened = opened
-        self._watch = opened.enter_context(psycopg.connect(dsn, autocommit=True))
+        watch = psycopg.connect(dsn, autocommit=True, options=f"-c search_path={MEMORY}")
+        self._watch = opened.enter_context(watch)
         self.store = self.another()
         self.store.add_types([EventType(name="Thing")])
-        self._run(
-            f"CREATE FUNCTION {MEMORY}.stop() RETURNS trigger LANGUAGE plpgsql AS"
+        watch.execute(
+            "CREATE FUNCTION stop() RETURNS trigger LANGUAGE plpgsql AS"
             " 'BEGIN PERFORM pg_advisory_xact_lock_shared(1); RETURN NULL; END'"
         )
 
@@ -66,20 +82,18 @@ class Robots:
 
         For `log_inbox` that is when a commit, a close, or a level of a load has done all else.
         """
-        self._run(f"CREATE TRIGGER stop AFTER INSERT ON {MEMORY}.{table} FOR EACH ROW EXECUTE FUNCTION {MEMORY}.stop()")
-        self._run("SELECT pg_advisory_lock(1)")
+        trigger = sql.SQL("CREATE TRIGGER stop AFTER INSERT ON {} FOR EACH ROW EXECUTE FUNCTION stop()")
+        self._watch.execute(trigger.format(sql.Identifier(table)))
+        self._watch.execute("SELECT pg_advisory_lock(1)")
         try:
             yield
         finally:
-            self._run("SELECT pg_advisory_unlock(1)")
+            self._watch.execute("SELECT pg_advisory_unlock(1)")
 
     def wait_for_locks(self, *waiting: Future[Any]) -> None:
         """Return once each of these has a statement that waits for a lock."""
         for _ in range(2_000):
-            (blocked,) = self._ask(
-                "SELECT count(*) FROM pg_stat_activity WHERE datname = current_database() AND wait_event_type = 'Lock'"
-            )
-            if blocked == len(waiting):
+            if self._ask(_WAITING) == len(waiting):
                 return
             for each in waiting:
                 assert not each.done(), f"it did not wait: {each.exception() or each.result()}"
@@ -87,33 +101,20 @@ class Robots:
         raise AssertionError("they do not wait for locks")
 
     def count(self, table: str) -> int:
-        (number,) = self._ask(f"SELECT count(*) FROM {MEMORY}.{table}")  # noqa: S608 - names of this file
-        return int(number)
+        return self._ask(sql.SQL("SELECT count(*) FROM {}").format(sql.Identifier(table)))
 
-    def open_wholes(self) -> int:
-        """Wholes that are still going on though none of their parts is."""
-        (number,) = self._ask(
-            f"SELECT count(*) FROM {MEMORY}.event w WHERE parts <> '{{}}' AND upper_inf(period) AND NOT EXISTS"  # noqa: S608
-            f" (SELECT 1 FROM {MEMORY}.part JOIN {MEMORY}.event p ON p.id = part_id"
-            f" WHERE whole_id = w.id AND upper_inf(p.period))"
-        )
-        return int(number)
+    def open_for_ever(self) -> int:
+        """How many wholes are still going on though none of their parts is."""
+        return self._ask(_OPEN_FOR_EVER)
 
     def closure(self) -> set[tuple[str, str]]:
         """The stored pairs (ancestor, descendant)."""
-        rows = self._watch.execute(
-            f"SELECT a.name, d.name FROM {MEMORY}.type_closure"  # type: ignore[arg-type]  # noqa: S608
-            f" JOIN {MEMORY}.event_type a ON a.id = ancestor_id JOIN {MEMORY}.event_type d ON d.id = descendant_id"
-        ).fetchall()
-        return set(rows)
+        return set(self._watch.execute(_CLOSURE).fetchall())
 
-    def _run(self, statement: str) -> None:
-        self._watch.execute(statement.encode())
-
-    def _ask(self, query: str) -> tuple[Any, ...]:
-        row: tuple[Any, ...] | None = self._watch.execute(query.encode()).fetchone()
+    def _ask(self, query: LiteralString | sql.Composed) -> int:
+        row = self._watch.execute(query).fetchone()
         assert row is not None
-        return row
+        return int(row[0])
 
 
 @pytest.fixture
@@ -163,6 +164,22 @@ def test_two_parts_closed_at_once_close_their_whole(robots: Robots, threads: Thr
     assert first_close.result() == Closed(new=True, wholes=())
     assert second_close.result() == Closed(new=True, wholes=(both.uid,))
     assert not is_open(robots.store, both)
+
+
+def test_closing_does_not_depend_on_the_isolation_that_a_database_has_by_default(
+    robots: Robots, threads: ThreadPoolExecutor, dsn: str
+) -> None:
+    with psycopg.connect(dsn, autocommit=True) as connection:
+        name = sql.Identifier(connection.info.dbname)
+        connection.execute(sql.SQL("ALTER DATABASE {} SET default_transaction_isolation = 'serializable'").format(name))
+    stores = [robots.another() for _ in range(4)]
+    for _ in range(10):
+        parts = [going_on() for _ in stores]
+        over = whole(*parts)
+        robots.store.commit_all(arrivals(*parts, over))
+        done = at_once(threads, [partial(s.close_event, p.uid, at(1)) for s, p in zip(stores, parts, strict=True)])
+        assert not [each for each in done if isinstance(each, Exception)]
+        assert not is_open(robots.store, over)
 
 
 def test_many_parts_closed_at_once_close_all_above_them(robots: Robots, threads: ThreadPoolExecutor) -> None:
@@ -287,7 +304,7 @@ def test_closes_and_writes_of_wholes_race(
         events = [top] if part.uid.int % 2 else [over, top]
         done = at_once(threads, [partial(write, writer, *events), partial(closer.close_event, part.uid, at(1))])
         assert not [each for each in done if isinstance(each, Exception)]
-        assert robots.open_wholes() == 0
+        assert robots.open_for_ever() == 0
 
 
 def test_the_same_end_from_many_is_one_close(robots: Robots, threads: ThreadPoolExecutor) -> None:
@@ -473,4 +490,4 @@ def test_no_writer_waits_for_ever(robots: Robots, threads: ThreadPoolExecutor) -
                     actions.append(partial(store.load, arrivals(*lower, *sorted(events, key=lambda e: bool(e.parts)))))
         done = at_once(threads, actions)
         assert not [each for each in done if isinstance(each, Exception) and not isinstance(each, UnknownEvent)]
-        assert robots.open_wholes() == 0
+        assert robots.open_for_ever() == 0

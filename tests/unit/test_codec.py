@@ -12,11 +12,11 @@ from hypothesis import given
 from shapely.geometry import Polygon
 
 from elm import cues
-from elm.cues.algebra import DEPTH_LIMIT, And, Cue, Not, Or
+from elm.cues.algebra import DEPTH_LIMIT, And, Comparison, Cue, Not, Or, SetRelation
 from elm.cues.codec import cue_from_json, cue_to_json
 from elm.errors import InvalidValue
 from elm.exchange import parse_json, to_line
-from elm.geometry import Region
+from elm.geometry import Region, SpatialRelation
 from elm.interval import AllenRelation
 from tests.clock import at, span
 from tests.strategies import TYPE_NAMES, combined_cues
@@ -25,8 +25,10 @@ BOX_JSON = {"type": "Polygon", "coordinates": [[[0.0, 0.0], [4.0, 0.0], [4.0, 4.
 BOX = Region.from_geojson(BOX_JSON, frame="map")
 ONE, TWO = UUID(int=1), UUID(int=2)
 ONE_TEXT, TWO_TEXT = "00000000-0000-0000-0000-000000000001", "00000000-0000-0000-0000-000000000002"
-SETS = ["equal", "subset", "superset", "intersects", "disjoint"]
-ALLEN = [relation.value for relation in AllenRelation]
+SETS = [*SetRelation]
+IN_TIME = [*SetRelation, *AllenRelation]
+IN_SPACE = [relation for relation in SpatialRelation if relation is not SpatialRelation.WITHIN_DISTANCE]
+COMPARISONS = [compare for compare in Comparison if compare is not Comparison.LIKE]
 BOUNDS = ["2026-01-01T10:00:00Z", "2026-01-01T10:00:04Z"]
 
 EXAMPLES: list[tuple[Cue, dict[str, Any]]] = [
@@ -44,18 +46,18 @@ EXAMPLES: list[tuple[Cue, dict[str, Any]]] = [
     (cues.exactly("Grasp"), {"op": "type", "relation": "exactly", "type": "Grasp"}),
     (cues.is_a("Grasp"), {"op": "type", "relation": "is_a", "type": "Grasp"}),
     *(
-        (build(relation, at(0), at(4)), {"op": op, "relation": relation, "interval": BOUNDS})
+        (build(relation, at(0), at(4)), {"op": op, "relation": relation.value, "interval": BOUNDS})
         for op, build in (("time", cues.time), ("recorded_at", cues.recorded))
-        for relation in [*SETS, *ALLEN]
+        for relation in IN_TIME
     ),
     (cues.time("subset"), {"op": "time", "relation": "subset", "interval": [None, None]}),
     (cues.time("subset", at(0)), {"op": "time", "relation": "subset", "interval": [BOUNDS[0], None]}),
     (cues.recorded("before", None, at(4)), {"op": "recorded_at", "relation": "before", "interval": [None, BOUNDS[1]]}),
     (cues.time("equal", span(0, None)), {"op": "time", "relation": "equal", "interval": [BOUNDS[0], None]}),
     *(
-        (build(relation, BOX), {"op": op, "relation": relation, "frame": "map", "polygon": BOX_JSON})
+        (build(relation, BOX), {"op": op, "relation": relation.value, "frame": "map", "polygon": BOX_JSON})
         for op, build in (("region", cues.region), ("subject", cues.subject))
-        for relation in [*SETS, "touches"]
+        for relation in IN_SPACE
     ),
     (
         cues.within(2.5, BOX),
@@ -67,10 +69,10 @@ EXAMPLES: list[tuple[Cue, dict[str, Any]]] = [
     ),
     *(
         (
-            cues.features(relation, [("object", "cup"), ("force", 3.2), ("n", 1), ("on", True)]),  # type: ignore[arg-type]
+            cues.features(relation, [("object", "cup"), ("force", 3.2), ("n", 1), ("on", True)]),
             {
                 "op": "features",
-                "relation": relation,
+                "relation": relation.value,
                 "features": [["object", "cup"], ["force", 3.2], ["n", 1], ["on", True]],
             },
         )
@@ -78,17 +80,17 @@ EXAMPLES: list[tuple[Cue, dict[str, Any]]] = [
     ),
     *(
         (
-            cues.feature_names(relation, ["b", "a"]),  # type: ignore[arg-type]
-            {"op": "feature_names", "relation": relation, "names": ["b", "a"]},
+            cues.feature_names(relation, ["b", "a"]),
+            {"op": "feature_names", "relation": relation.value, "names": ["b", "a"]},
         )
         for relation in SETS
     ),
     *(
         (
-            cues.feature("force", compare, 3.5),  # type: ignore[arg-type]
-            {"op": "feature", "name": "force", "compare": compare, "value": 3.5},
+            cues.feature("force", compare, 3.5),
+            {"op": "feature", "name": "force", "compare": compare.value, "value": 3.5},
         )
-        for compare in ["=", "!=", "<", "<=", ">", ">="]
+        for compare in COMPARISONS
     ),
     (
         cues.feature("object", "like", "c\\%p%"),
@@ -104,17 +106,17 @@ EXAMPLES: list[tuple[Cue, dict[str, Any]]] = [
     (cues.agent("armar7"), {"op": "agent", "agent": "armar7"}),
     *(
         (
-            cues.lasting(compare, timedelta(seconds=90)),  # type: ignore[arg-type]
-            {"op": "duration", "compare": compare, "seconds": 90},
+            cues.lasting(compare, timedelta(seconds=90)),
+            {"op": "duration", "compare": compare.value, "seconds": 90},
         )
-        for compare in ["=", "!=", "<", "<=", ">", ">="]
+        for compare in COMPARISONS
     ),
     (cues.lasting(">", timedelta(seconds=-1)), {"op": "duration", "compare": ">", "seconds": -1}),
     (cues.lasting("=", timedelta(microseconds=1)), {"op": "duration", "compare": "=", "seconds": 1e-06}),
     *(
         (
             build(relation, [TWO, ONE], transitive=transitive),
-            {"op": op, "relation": relation, "uids": [TWO_TEXT, ONE_TEXT], "transitive": transitive},
+            {"op": op, "relation": relation.value, "uids": [TWO_TEXT, ONE_TEXT], "transitive": transitive},
         )
         for op, build in (("parts", cues.parts), ("wholes", cues.wholes))
         for relation in SETS

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import math
 import pickle
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -23,7 +23,7 @@ HOLE = [(1.0, 1.0), (2.0, 1.0), (2.0, 2.0), (1.0, 2.0)]
 OTHER_HOLE = [(3.0, 3.0), (3.5, 3.0), (3.5, 3.5)]
 
 
-def quietly(shell: list[tuple[float, ...]], *holes: list[tuple[float, ...]]) -> Polygon:
+def quietly(shell: Sequence[tuple[float, ...]], *holes: Sequence[tuple[float, ...]]) -> Polygon:
     """A polygon with coordinates that numpy would warn about."""
     with np.errstate(invalid="ignore"):
         return Polygon(shell, holes)

@@ -215,7 +215,7 @@ def test_intervals_and_windows_are_frozen_and_keyword_only() -> None:
     with pytest.raises(FrozenInstanceError):
         window(0, 5).begin = at(1)  # type: ignore[misc]
     with pytest.raises(TypeError):
-        Interval(at(0), at(5))  # type: ignore[misc]
+        Interval(at(0), at(5))  # type: ignore[call-arg]
 
 
 def test_a_window_without_bound_reaches_to_infinity() -> None:

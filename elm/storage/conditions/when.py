@@ -6,7 +6,7 @@ from collections.abc import Callable
 from datetime import timedelta
 from typing import Any, assert_never
 
-from sqlalchemy import ColumnElement, FromClause, Interval, and_, false, func, literal_column, not_, or_, true
+from sqlalchemy import ColumnElement, FromClause, Interval, and_, false, func, literal_column, or_
 from sqlalchemy.dialects.postgresql import TSTZRANGE
 from sqlalchemy.types import TypeEngine
 
@@ -58,7 +58,8 @@ def _during(relation: SetRelation | AllenRelation, period: ColumnElement[Any], c
         case SetRelation.INTERSECTS:
             return touching(window)
         case SetRelation.DISJOINT:
-            return not_(touching(window))
+            # Not NOT &&, which no index understands.
+            return or_(period.op("<<", is_comparison=True)(window), period.op(">>", is_comparison=True)(window))
         # The range operators in front of Allen's comparisons are what the GiST index understands.
         case AllenRelation.BEFORE:
             return period.op("<<", is_comparison=True)(window)
@@ -69,9 +70,9 @@ def _during(relation: SetRelation | AllenRelation, period: ColumnElement[Any], c
         case AllenRelation.MET_BY:
             return a == d
         case AllenRelation.OVERLAPS:
-            return and_(touching(window), a < c, c < b, b < d)
+            return and_(_at(touching, c), a < c, c < b, b < d)
         case AllenRelation.OVERLAPPED_BY:
-            return and_(touching(window), c < a, a < d, d < b)
+            return and_(_at(touching, d), c < a, a < d, d < b)
         case AllenRelation.STARTS:
             return and_(a == c, b < d)
         case AllenRelation.STARTED_BY:
@@ -91,10 +92,11 @@ def _during(relation: SetRelation | AllenRelation, period: ColumnElement[Any], c
 
 
 def _at(touching: Callable[[Any], Condition], moment: Bind) -> Condition:
-    """The events that cover an instant; of an infinite one the condition behind decides alone."""
-    if moment is _MINUS_INFINITY or moment is _PLUS_INFINITY:
-        return true()
-    return touching(_range(moment, moment))
+    """The events that cover an instant: none the beginning of time, the open ones its end."""
+    if moment is _MINUS_INFINITY:
+        return false()
+    # Here infinity is meant as an instant like any other: a range without upper bound covers it.
+    return touching(func.tstzrange(moment, moment, literal_column("'[]'"), type_=TSTZRANGE))
 
 
 def _recorded(relation: SetRelation | AllenRelation, t: ColumnElement[Any], c: Bind, d: Bind) -> Condition:

@@ -1,0 +1,460 @@
+"""What the server does for each kind of question in a memory of 100,000 events: read from the plans as they were run."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from datetime import datetime, timedelta
+from itertools import islice
+from typing import Any
+
+import pytest
+
+from elm import cues
+from elm.app import Memory
+from elm.cues.algebra import Cue, Place, SetRelation
+from elm.event import Event, StoredEvent
+from elm.geometry import Region
+from elm.interval import Interval
+from elm.storage import recall_statements
+from elm.storage.postgres import PostgresStore
+from elm.store import Arrival, Nearest, Order, Query
+from simulators import hierarchy
+from simulators.events import World, simulate
+from tests.servers import MEMORY, Server
+
+EVENTS = 100_000
+NEW = 400
+"""The last events: all of one type, frame, agent and feature name that nothing before them has."""
+FEW_ROWS, FEW_BUFFERS = 10, 50
+"""An answer of at most so many rows is found in fewer buffers than this."""
+
+_SECOND = timedelta(seconds=1)
+_INSTANT = timedelta(microseconds=1)
+_ORDERS = (Order.BEGIN, Order.BEGIN_REVERSED)
+
+
+def _life() -> Iterator[Arrival]:
+    """A robot's life in one building, then a visit to a new one; each event is learned of at a moment of its own."""
+    last = World().begin
+    for number, event in enumerate(islice(simulate(1, World()), EVENTS - NEW)):
+        last = _ended(event, last)
+        yield Arrival(event=event, recorded_at=last + number * _INSTANT)
+    annex = World(frame="annex", agent="rover", begin=last + timedelta(hours=1))
+    for number, event in enumerate(islice(simulate(2, annex), NEW)):
+        features = [*event.features, ("radiation", number / 2), *([("serial", number)] if number % 80 == 0 else [])]
+        place = None if event.parts else Region.around(20 + number / 4, 7, 0.2, frame="annex")
+        visit = replace(event, type="Inspection", features=tuple(features), subject=place)
+        if number % 100 == 1:
+            visit = replace(visit, agent="visitor")
+        if number % 100 == 2 and visit.interval is not None:
+            visit = replace(visit, interval=Interval.since(visit.interval.begin))
+        last = _ended(event, last)
+        yield Arrival(event=visit, recorded_at=last + (EVENTS + number) * _INSTANT)
+
+
+def _ended(event: Event, before: datetime) -> datetime:
+    ends = None if event.interval is None else event.interval.end
+    return before if ends is None else max(before, ends)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Life:
+    """The memory, and some events in it to ask about."""
+
+    store: PostgresStore
+    first: StoredEvent
+    event: StoredEvent
+    whole: StoredEvent
+    visit: StoredEvent
+    last: StoredEvent
+
+    @property
+    def interval(self) -> tuple[datetime, datetime]:
+        """When `event` began and ended."""
+        assert self.event.interval.end is not None
+        return self.event.interval.begin, self.event.interval.end
+
+
+@pytest.fixture(scope="module")
+def life(postgres_server: Server) -> Iterator[Life]:
+    with postgres_server.database() as dsn:
+        store = PostgresStore(dsn, MEMORY)
+        memory = Memory(store)
+        memory.add_types(hierarchy.event_types())
+        memory.add_type("Inspection")
+        report = memory.load(_life(), batch=10_000)
+        assert (report.new, report.refused) == (EVENTS, 0)
+        middle = (event for event in memory.recall(order="id", after=None, limit=EVENTS // 2 + 100) if not event.parts)
+        event = next(each for each in islice(middle, 40_000, None) if each.interval.duration and each.wholes)
+        (whole,) = memory.recall(cues.uid(*event.wholes))
+        visit = next(each for each in memory.recall(cues.exactly("Inspection")) if each.subject is not None)
+        first, last = memory.recall().first(), memory.recall().last()
+        assert first is not None
+        assert last is not None
+        yield Life(store=store, first=first, event=event, whole=whole, visit=visit, last=last)
+        store.close()
+
+
+# Reading plans
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cost:
+    """What a statement did: the rows it gave, the pages it touched, and the tables it read from end to end."""
+
+    rows: int
+    buffers: int
+    scanned: tuple[str, ...]
+
+    def __str__(self) -> str:
+        return f"{self.rows} rows in {self.buffers} buffers" + "".join(f", scanning {name}" for name in self.scanned)
+
+
+def _nodes(plan: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    yield plan
+    for inner in plan.get("Plans", ()):
+        yield from _nodes(inner)
+
+
+def _run(store: PostgresStore, text: str, values: Mapping[str, Any]) -> Cost:
+    """Run a statement as recalls are run, on one of their connections."""
+    with store._connections.recalling() as connection:
+        connection.execute(text, values, binary=True).fetchall()
+        row = connection.execute(f"EXPLAIN (ANALYZE, BUFFERS, FORMAT JSON) {text}", values, binary=False).fetchone()
+    assert row is not None
+    plan = row[0] if isinstance(row[0], list) else json.loads(row[0])
+    top = plan[0]["Plan"]
+    scans = [
+        node["Relation Name"]
+        for node in _nodes(top)
+        if node["Node Type"] == "Seq Scan" and node["Actual Loops"] and node["Relation Name"] in ("event", "part")
+    ]
+    buffers = top["Shared Hit Blocks"] + top["Shared Read Blocks"]
+    return Cost(rows=top["Actual Rows"], buffers=buffers, scanned=tuple(scans))
+
+
+def cost(store: PostgresStore, query: Query) -> Cost:
+    """What a recall costs; the names and pages that it needs have been read before."""
+    return _run(store, *store._asked("find", query, recall_statements.find))
+
+
+def _text_of(store: PostgresStore, build: Callable[..., Any], cue: Cue) -> tuple[str, dict[str, Any]]:
+    compiled = store._compiled(cue)
+    return str(build(compiled).compile(dialect=recall_statements.DIALECT)), compiled.values
+
+
+# Few rows
+
+
+def _around(life: Life, before: float = 0, after: float = 0) -> tuple[datetime, datetime]:
+    """The middle event's interval, moved out (or in) by some seconds at either end."""
+    begin, end = life.interval
+    return begin - before * _SECOND, end + after * _SECOND
+
+
+def _inside(life: Life) -> datetime:
+    begin, end = life.interval
+    return begin + (end - begin) / 2
+
+
+Ask = Callable[[Life], Cue]
+_SETS = (SetRelation.EQUAL, SetRelation.SUBSET, SetRelation.SUPERSET, SetRelation.INTERSECTS)
+
+
+def _by_sets(build: Callable[..., Cue], value: Callable[[Life], Any], name: str) -> dict[str, Ask]:
+    return {f"{name}.{relation}": lambda life, r=relation: build(r, value(life)) for relation in _SETS}  # type: ignore[misc]
+
+
+def _names(event: StoredEvent) -> list[str]:
+    return [name for name, _ in event.features]
+
+
+def _serial(life: Life) -> list[tuple[str, int]]:
+    return [("serial", 80), ("serial", 160)]
+
+
+FEW: Mapping[str, Ask] = {
+    "type.exactly": lambda life: cues.exactly(life.event.type),
+    "type.is_a": lambda life: cues.is_a(life.event.type),
+    "payload.equal": lambda life: cues.payload(life.event.payload.data if life.event.payload else b""),
+    **_by_sets(cues.time, lambda life: life.event.interval, "time"),
+    **_by_sets(cues.region, lambda life: life.event.region, "region"),
+    **_by_sets(cues.subject, lambda life: life.visit.subject, "subject"),
+    **_by_sets(cues.features, lambda life: life.event.features, "features"),
+    **_by_sets(cues.feature_names, lambda life: _names(life.event), "feature_names"),
+    "features.intersects": lambda life: cues.features("intersects", _serial(life)),
+    "feature_names.intersects": lambda life: cues.feature_names("intersects", ["serial"]),
+    **{
+        f"parts.{relation}": lambda life, r=relation: cues.parts(r, life.whole.parts)  # type: ignore[misc]
+        for relation in _SETS
+        if relation is not SetRelation.SUBSET
+    },
+    **{
+        f"wholes.{relation}": lambda life, r=relation: cues.wholes(r, life.event.wholes)  # type: ignore[misc]
+        for relation in _SETS
+        if relation is not SetRelation.SUBSET
+    },
+    **{
+        f"parts.{relation}, transitive": lambda life, r=relation: cues.parts(r, life.whole.parts, transitive=True)  # type: ignore[misc]
+        for relation in _SETS
+        if relation is not SetRelation.SUBSET
+    },
+    **{
+        f"wholes.{relation}, transitive": lambda life, r=relation: cues.wholes(r, life.event.wholes, transitive=True)  # type: ignore[misc]
+        for relation in _SETS
+        if relation is not SetRelation.SUBSET
+    },
+    # Allen's relations to a window of the event's own size, and to one that reaches to the end of the memory.
+    "time.before": lambda life: cues.time("before", life.first.interval.begin + 9 * _SECOND, None),
+    "time.after": lambda life: cues.time("after", None, life.last.interval.begin - 5 * _SECOND),
+    "time.meets": lambda life: cues.time("meets", life.interval[1], life.interval[1] + _SECOND),
+    "time.met_by": lambda life: cues.time("met_by", life.interval[0] - _SECOND, life.interval[0]),
+    "time.overlaps": lambda life: cues.time("overlaps", _inside(life), life.interval[1] + _SECOND),
+    "time.overlaps, long": lambda life: cues.time("overlaps", _inside(life), life.last.interval.begin),
+    "time.overlapped_by": lambda life: cues.time("overlapped_by", life.interval[0] - _SECOND, _inside(life)),
+    "time.overlapped_by, long": lambda life: cues.time("overlapped_by", life.first.interval.begin, _inside(life)),
+    "time.starts": lambda life: cues.time("starts", life.interval[0], life.interval[1] + _SECOND),
+    "time.started_by": lambda life: cues.time("started_by", life.interval[0], _inside(life)),
+    "time.during": lambda life: cues.time("during", *_around(life, 0.01, 0.01)),
+    "time.contains": lambda life: cues.time("contains", _inside(life), _inside(life)),
+    "time.finishes": lambda life: cues.time("finishes", life.interval[0] - _SECOND, life.interval[1]),
+    "time.finishes, open": lambda life: cues.time("finishes", life.first.interval.begin - _SECOND, None),
+    "time.finished_by": lambda life: cues.time("finished_by", _inside(life), life.interval[1]),
+    "time.finished_by, open": lambda life: cues.time("finished_by", life.last.interval.begin, None),
+    "time.equals": lambda life: cues.time("equals", life.event.interval),
+    "time.equals, open": lambda life: cues.time("equals", life.last.interval.begin, None),
+    "time.disjoint": lambda life: cues.time(
+        "disjoint", life.first.interval.begin + 4 * _SECOND, life.last.interval.begin - _SECOND
+    ),
+    **{
+        f"recorded_at.{relation}": lambda life, r=relation: cues.recorded(
+            r, life.event.recorded_at, life.event.recorded_at
+        )  # type: ignore[misc]
+        for relation in _SETS
+    },
+    "recorded_at.before": lambda life: cues.recorded("before", life.first.recorded_at + 9 * _SECOND, None),
+    "recorded_at.after": lambda life: cues.recorded("after", None, life.last.recorded_at - 2 * _SECOND),
+    "recorded_at.during": lambda life: cues.recorded(
+        "during", life.event.recorded_at - _SECOND, life.event.recorded_at + _SECOND
+    ),
+    "recorded_at.disjoint": lambda life: cues.recorded(
+        "disjoint", life.first.recorded_at + 2 * _SECOND, life.last.recorded_at - _SECOND
+    ),
+    "region.touches": lambda life: cues.region("touches", life.event.region or _NOWHERE),
+    "region.within_distance": lambda life: cues.within(0.01, life.visit.region or _NOWHERE),
+    "subject.touches": lambda life: cues.subject("touches", life.visit.subject or _NOWHERE),
+    "subject.within_distance": lambda life: cues.subject_within(0.1, life.visit.subject or _NOWHERE),
+    "feature.=": lambda life: cues.feature("serial", "=", 80),
+    "feature.>": lambda life: cues.feature("serial", ">", 80),
+    "feature.!=": lambda life: cues.feature("serial", "!=", 80),
+    "agent": lambda life: cues.agent("visitor"),
+    "uid": lambda life: cues.uid(life.event.uid, life.whole.uid, life.last.uid),
+    "and": lambda life: cues.time("intersects", life.event.interval) & cues.exactly(life.event.type),
+    "and, one of them wide": lambda life: (
+        cues.is_a("type-3") & cues.time("intersects", life.event.interval) & cues.feature_names("superset", ["object"])
+    ),
+    "and, a wide comparison": lambda life: cues.uid(life.event.uid) & ~cues.feature("speed", ">", 1_000),
+    "or": lambda life: cues.agent("visitor") | cues.uid(life.event.uid),
+    "and, not": lambda life: cues.time("intersects", life.event.interval) & ~cues.agent("visitor"),
+}
+"""Cues that few events match: those of the paper's classes that can be, and one at least of every other kind."""
+
+_NOWHERE = Region.box(-9, -9, -8, -8, frame="annex")
+
+
+@pytest.mark.parametrize("limit", [None, FEW_ROWS])
+@pytest.mark.parametrize("name", FEW)
+def test_few_rows_are_found_in_few_buffers(life: Life, name: str, limit: int | None) -> None:
+    cue = FEW[name](life)
+    costs = [cost(life.store, Query(cue=cue, order=order, limit=limit)) for order in _ORDERS]
+    assert all(each.rows <= FEW_ROWS for each in costs), f"the cue is no example: {costs[0]}"
+    assert [str(each) for each in costs if each.buffers >= FEW_BUFFERS or each.scanned] == []
+
+
+def test_the_cues_find_something(life: Life) -> None:
+    nothing = [name for name, ask in FEW.items() if not life.store.count(ask(life))]
+    assert nothing == ["region.touches", "subject.touches"]
+
+
+# The first of many rows
+
+
+MANY: Mapping[str, Ask] = {
+    "everything": lambda life: cues.everything(),
+    "type.is_a": lambda life: cues.is_a("type-3"),
+    "time.intersects": lambda life: cues.time("intersects", life.first.interval.begin, life.last.interval.begin),
+    "time.subset": lambda life: cues.time("subset", life.first.interval.begin, life.last.interval.begin),
+    "region.subset": lambda life: cues.region("subset", Region.box(-1, -1, 201, 201)),
+    "region.disjoint": lambda life: cues.region("disjoint", Region.box(-9, -9, -8, -8)),
+    "parts.subset": lambda life: cues.parts("subset", life.whole.parts),
+    "wholes.subset": lambda life: cues.wholes("subset", life.event.wholes),
+    "parts.subset, transitive": lambda life: cues.parts("subset", life.whole.parts, transitive=True),
+    "wholes.subset, transitive": lambda life: cues.wholes("subset", life.event.wholes, transitive=True),
+    "parts.disjoint": lambda life: cues.parts("disjoint", life.whole.parts),
+    "feature_names.intersects": lambda life: cues.feature_names("intersects", ["object", "door", "force"]),
+    "feature.like": lambda life: cues.feature("object", "like", "%o%"),
+    "agent": lambda life: cues.agent("robot"),
+    "duration.>": lambda life: cues.lasting(">", _SECOND),
+    "not": lambda life: ~cues.agent("visitor"),
+}
+"""Cues that many events match, all along."""
+
+
+@pytest.mark.parametrize("name", MANY)
+def test_first_rows_of_many_are_found_in_few_buffers(life: Life, name: str) -> None:
+    cue = MANY[name](life)
+    assert life.store.count(cue) > 5_000
+    costs = [cost(life.store, Query(cue=cue, order=order, limit=FEW_ROWS)) for order in _ORDERS]
+    assert all(each.rows == FEW_ROWS for each in costs)
+    assert [str(each) for each in costs if each.buffers >= FEW_BUFFERS or each.scanned] == []
+
+
+# What correlates with time
+
+
+CORRELATED: Mapping[str, Ask] = {
+    "type": lambda life: cues.exactly("Inspection"),
+    "is_a": lambda life: cues.is_a("Inspection"),
+    "frame": lambda life: cues.region("intersects", Region.box(0, 0, 200, 200, frame="annex")),
+    "subject": lambda life: cues.subject("intersects", Region.box(0, 0, 500, 200, frame="annex")),
+    "feature name": lambda life: cues.feature_names("superset", ["radiation"]),
+    "feature": lambda life: cues.feature("radiation", ">", 0),
+    "agent": lambda life: cues.agent("rover"),
+    "recorded_at": lambda life: cues.recorded("after", None, life.visit.recorded_at),
+}
+"""Cues of what only the last events have."""
+
+
+def _naive(life: Life, cue: Cue, order: Order, limit: int) -> Cost:
+    """The cost of the statement that one would write first: all conditions, then ORDER BY and LIMIT."""
+    text, values = life.store._asked("find", Query(cue=cue, order=order), recall_statements.find)
+    return _run(life.store, f"{text} LIMIT %(limit)s", {**values, "limit": limit})
+
+
+def test_correlation_is_a_trap(life: Life) -> None:
+    """Sanity of the events: a planner left alone walks the begin index to its far end for some of these cues."""
+    walked = [
+        name
+        for name, ask in CORRELATED.items()
+        if any(_naive(life, ask(life), Order.BEGIN, limit).buffers > EVENTS / 20 for limit in (1, 5, 10))
+    ]
+    assert len(walked) >= 3
+
+
+@pytest.mark.parametrize("order", Order)
+@pytest.mark.parametrize("name", CORRELATED)
+def test_limited_recall_is_bounded_by_its_hits(life: Life, name: str, order: Order) -> None:
+    """Whatever the limit, no more is touched than all hits and the rows of a bounded walk need."""
+    cue = CORRELATED[name](life)
+    assert NEW - 100 < life.store.count(cue) <= NEW
+    for limit, most in ((1, 350), (10, 450), (100, 1_600), (1_000, 5_000), (recall_statements.WALK_MOST, 5_000)):
+        found = cost(life.store, Query(cue=cue, order=order, limit=limit))
+        assert found.rows == min(limit, life.store.count(cue))
+        assert found.buffers < most, f"limit {limit}: {found}"
+
+
+@pytest.mark.parametrize("name", CORRELATED)
+def test_existence_and_count_are_bounded_by_the_hits(life: Life, name: str) -> None:
+    cue = CORRELATED[name](life)
+    for build in (recall_statements.any_match, recall_statements.count):
+        found = _run(life.store, *_text_of(life.store, build, cue))
+        assert found.rows == 1
+        assert found.buffers < NEW, f"{build.__name__}: {found}"
+
+
+@pytest.mark.parametrize("name", CORRELATED)
+@pytest.mark.parametrize("place", Place)
+def test_nearest_is_bounded_by_the_hits(life: Life, name: str, place: Place) -> None:
+    """Also where the nearest events, thousands of them, do not match the cue."""
+    cue = CORRELATED[name](life)
+    here = {Place.REGION: life.event.region, Place.SUBJECT: life.visit.subject}[place]
+    assert here is not None
+    for to in (here, Region.around(100, 100, 1, frame="annex"), Region.around(100, 100, 1, frame="unknown")):
+        found = cost(life.store, Query(cue=cue, order=Nearest(to=to, place=place), limit=10))
+        assert found.buffers < 1_000, f"{to.frame}: {found}"
+
+
+def test_nearest_walks_the_index(life: Life) -> None:
+    here = life.event.region
+    assert here is not None
+    found = cost(life.store, Query(order=Nearest(to=here), limit=FEW_ROWS))
+    assert found.rows == FEW_ROWS
+    assert found.buffers < 100
+
+
+@pytest.mark.parametrize("order", Order)
+def test_paging_goes_on_where_it_ended(life: Life, order: Order) -> None:
+    """A page deep in the memory costs what the first one does."""
+    from elm.store import Cursor
+
+    first = cost(life.store, Query(order=order, limit=100))
+    deep = cost(life.store, Query(order=order, limit=100, after=Cursor.after(life.event)))
+    assert deep.rows == 100
+    assert deep.buffers < 1.5 * first.buffers
+    assert deep.buffers < 1_600
+
+
+# Connections
+
+
+def _settings(connection: Any) -> dict[str, str]:
+    names = ("TimeZone", "jit", "plan_cache_mode", "max_parallel_workers_per_gather", "random_page_cost", "work_mem")
+    return {name: connection.execute(f"SHOW {name}").fetchone()[0] for name in names}
+
+
+def test_recalls_are_planned_for_their_values(life: Life) -> None:
+    with life.store._connections.recalling() as connection:
+        assert _settings(connection) == {
+            "TimeZone": "UTC",
+            "jit": "off",
+            "plan_cache_mode": "force_custom_plan",
+            "max_parallel_workers_per_gather": "0",
+            "random_page_cost": "1.1",
+            "work_mem": "64MB",
+        }
+
+
+def test_writes_are_planned_once(life: Life) -> None:
+    with life.store._connections.writing() as connection:
+        settings = _settings(connection)
+    assert (settings["TimeZone"], settings["jit"]) == ("UTC", "off")
+    assert settings["plan_cache_mode"] == "force_generic_plan"
+
+
+_PREPARED = "SELECT statement, generic_plans, custom_plans FROM pg_prepared_statements"
+
+
+@pytest.mark.parametrize("limit", [None, 100])
+def test_recalls_that_repeat_keep_their_plans(life: Life, limit: int | None) -> None:
+    """The driver prepares what is run often; the server must not make a plan for any values of it then."""
+    place = life.event.region
+    assert place is not None
+    narrow, wide = cues.region("intersects", place), cues.region("subset", Region.box(-1, -1, 201, 201))
+    query = Query(cue=wide & cues.time("subset", *_around(life, 300, 300)), limit=limit)
+    before = cost(life.store, query)
+    for _ in range(10):
+        assert len(list(life.store.find(query))) == before.rows
+        list(life.store.find(Query(cue=narrow, limit=limit)))
+    with life.store._connections.recalling() as connection:
+        prepared = [
+            row
+            for row in connection.execute(_PREPARED).fetchall()
+            if "feature_ends" in row[0] or "FROM event" in row[0]
+        ]
+    assert [row for row in prepared if row[1]] == []
+    assert cost(life.store, query).buffers <= before.buffers
+
+
+def test_commits_that_repeat_keep_their_plan(life: Life) -> None:
+    begin = life.last.interval.begin + 9 * _SECOND
+    parts = [Event(type="Inspection", interval=Interval.at(begin + n * _SECOND)) for n in range(10)]
+    for part in parts:
+        life.store.commit(Arrival(event=part))
+        life.store.commit(Arrival(event=Event(type="Inspection", parts=[part.uid])))
+    with life.store._connections.writing() as connection:
+        prepared = connection.execute(_PREPARED).fetchall()
+    inserts = [row for row in prepared if "INSERT INTO event" in row[0]]
+    assert len(inserts) == 2
+    assert all(generic >= 10 and custom == 0 for _, generic, custom in inserts)
