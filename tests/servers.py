@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import shutil
 import tempfile
+import warnings
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
@@ -73,21 +75,28 @@ def run_private_cluster() -> Iterator[Server]:
 @contextmanager
 def run_container() -> Iterator[Server]:
     """A container of the image in ELM_TEST_IMAGE; skips where no Docker engine answers."""
-    docker = pytest.importorskip("docker", reason="containers need the package docker")
     from testcontainers.community.postgres import PostgresContainer
 
-    # Asked for first, because the client leaks a socket where nobody listens.
-    host = os.environ.get("DOCKER_HOST", "unix:///var/run/docker.sock")
-    if host.startswith("unix://") and not Path(host.removeprefix("unix://")).exists():
-        pytest.skip(f"no Docker engine answers at {host}")
-    try:
-        engine = docker.from_env()
-        engine.ping()
-    except docker.errors.DockerException as error:
-        pytest.skip(f"no Docker engine answers: {error}")
-    engine.close()
+    if silence := _why_no_engine_answers():
+        pytest.skip(f"no Docker engine answers: {silence}")
     with PostgresContainer(IMAGE, driver="psycopg") as container:
         address = container.get_connection_url(driver=None).rpartition("/")[0]
         server = Server(dsn=lambda database: f"{address}/{database}")
         server.prepare()
         yield server
+
+
+def _why_no_engine_answers() -> str | None:
+    docker = pytest.importorskip("docker", reason="containers need the package docker")
+    with warnings.catch_warnings():
+        # The client leaves the socket to the garbage collector when nobody answers.
+        warnings.simplefilter("ignore", ResourceWarning)
+        try:
+            with closing(docker.from_env()) as engine:
+                engine.ping()
+        except (docker.errors.DockerException, OSError) as error:
+            reason = str(error)
+        else:
+            return None
+        gc.collect()
+    return reason

@@ -63,10 +63,10 @@ def repeated(arrivals: Sequence[Arrival]) -> tuple[dict[int, str], set[int]]:
     other: dict[int, str] = {}
     same: set[int] = set()
     for index, arrival in enumerate(arrivals):
-        known = first.setdefault(arrival.event.uid, arrival.event)
-        if known is arrival.event:
-            continue
-        if content_hash(known) == content_hash(arrival.event):
+        known = first.get(arrival.event.uid)
+        if known is None:
+            first[arrival.event.uid] = arrival.event
+        elif known is arrival.event or content_hash(known) == content_hash(arrival.event):
             same.add(index)
         else:
             other[index] = f"the uid {known.uid} stands earlier with other content: give one of them a new uid"

@@ -181,6 +181,9 @@ class Connections:
             self._check_open()
             if self._writing is None or _is_lost(self._writing):
                 self._writing = self._open(WRITING)
+                # At a rollback the driver would deallocate its own prepared statements, and with them those of
+                # `prepared`, of which it does not know.
+                self._writing.prepare_threshold = None
             with translated(self._memory):
                 yield self._writing
 
