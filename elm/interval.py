@@ -22,15 +22,17 @@ def as_utc(moment: datetime, *, what: str) -> datetime:
     """`moment` in UTC; naive datetimes are refused, naming `what`, for nobody can know which instant they mean."""
     if not isinstance(moment, datetime):
         raise InvalidValue(f"{what} must be a datetime, not {type(moment).__name__}: {moment!r}")
-    if moment.tzinfo is UTC:
+    if type(moment) is datetime and moment.tzinfo is UTC:
         return moment
     if moment.utcoffset() is None:
         raise InvalidValue(
             f"{what} is a naive datetime ({moment.isoformat()}): say which zone it is in, "
             f"for example {moment.replace(tzinfo=UTC).isoformat()} with tzinfo=datetime.UTC"
         )
+    # A plain datetime: a pandas Timestamp, say, has finer digits, which are cut.
+    plain = datetime.combine(moment.date(), moment.time(), moment.tzinfo).replace(fold=moment.fold)
     try:
-        return moment.astimezone(UTC)
+        return plain.astimezone(UTC)
     except OverflowError as error:
         raise InvalidValue(f"{what} is outside the years 1 to 9999 in UTC: {moment.isoformat()}") from error
 

@@ -13,8 +13,11 @@ from elm.cues.algebra import And, Cue, Place
 from elm.errors import InvalidValue
 from elm.event import Event, StoredEvent
 from elm.geometry import Region
-from elm.interval import from_micros, to_micros
+from elm.interval import as_utc, from_micros, to_micros
 from elm.taxonomy import EventType
+
+MOST_ID = 2**63 - 1
+"""Greatest id of an event, and most events that can be asked for."""
 
 # Reading
 
@@ -41,6 +44,11 @@ class Cursor:
 
     begin: datetime
     id: int
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "begin", as_utc(self.begin, what="the begin of a cursor"))
+        if not 0 <= self.id <= MOST_ID:
+            raise InvalidValue(f"the id of a cursor is a number from 0 to {MOST_ID}, not {self.id!r}")
 
     @classmethod
     def after(cls, event: StoredEvent) -> Self:
@@ -70,8 +78,8 @@ class Query:
     after: Cursor | None = None
 
     def __post_init__(self) -> None:
-        if self.limit is not None and (isinstance(self.limit, bool) or self.limit < 0):
-            raise InvalidValue(f"a limit is a number of events, 0 or more, not {self.limit!r}")
+        if self.limit is not None and (isinstance(self.limit, bool) or not 0 <= self.limit <= MOST_ID):
+            raise InvalidValue(f"a limit is a number of events, 0 to {MOST_ID}, not {self.limit!r}")
         if self.after is not None and isinstance(self.order, Nearest):
             raise InvalidValue("paging goes by begin or id; the nearest events are asked for with a limit")
 

@@ -42,20 +42,6 @@ def elm_version() -> str:
         return "unknown (not installed, runs from its sources)"
 
 
-def masked(dsn: str) -> str:
-    """A DSN with its secrets hidden; one that cannot be read is not shown at all."""
-    from psycopg import ProgrammingError
-    from psycopg.conninfo import conninfo_to_dict
-
-    if dsn.startswith("memory:"):
-        return dsn
-    try:
-        known = conninfo_to_dict(dsn)
-    except ProgrammingError:
-        return "set, but it is no DSN that libpq can read"
-    return " ".join(f"{name}={'***' if 'password' in name else value}" for name, value in known.items())
-
-
 def _program() -> Iterator[Finding]:
     yield "elm", elm_version()
     yield "Python", f"{platform.python_implementation()} {platform.python_version()} ({sys.executable})"
@@ -78,9 +64,9 @@ def _packages() -> Iterator[Finding]:
     import shapely
 
     yield "GEOS", ".".join(map(str, shapely.geos_version))
-    from psycopg import pq
+    from elm.storage.diagnosis import libpq_version
 
-    yield "libpq", f"{pq.version()} ({pq.__impl__})"
+    yield "libpq", libpq_version()
 
 
 def _name_in(requirement: str) -> str:
@@ -89,6 +75,8 @@ def _name_in(requirement: str) -> str:
 
 
 def _settings() -> Iterator[Finding]:
+    from elm.storage.diagnosis import masked
+
     for name in (*_SETTINGS, *_LIBPQ, *_SECRET):
         value = os.environ.get(name)
         if value is None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from functools import partial
 
@@ -60,15 +59,19 @@ def diagnose(dsn: str | None, memory: str) -> list[tuple[str, str]]:
 
 
 def masked(dsn: str) -> str:
-    """A DSN without its password, in either of libpq's two forms."""
+    """A DSN with its secrets hidden; one that cannot be read is not shown at all, for any part may be one."""
+    if dsn.startswith("memory:"):
+        return dsn
     try:
-        psycopg.conninfo.conninfo_to_dict(dsn)
+        known = psycopg.conninfo.conninfo_to_dict(dsn)
     except psycopg.ProgrammingError:
-        # Where its parts cannot be told apart, any of them may be the password.
-        return "not shown, for it is none"
-    without = re.sub(r"(://[^:/@]*):.*@", r"\1:***@", dsn)
-    without = re.sub(r"([?&](?:password|sslpassword)=)[^&]*", r"\1***", without)
-    return re.sub(r"\b(password|sslpassword)\s*=\s*('(?:[^'\\]|\\.)*'|\S+)", r"\1=***", without)
+        return "not shown: it is no DSN that libpq can read"
+    return " ".join(f"{name}={'***' if 'password' in name else value}" for name, value in known.items())
+
+
+def libpq_version() -> str:
+    """The version of the client library, and how psycopg comes to it."""
+    return f"{psycopg.pq.version()} ({psycopg.pq.__impl__})"
 
 
 def _revision(connection: Connection, memory: str) -> str:

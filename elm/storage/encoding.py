@@ -10,7 +10,7 @@ from uuid import UUID
 import msgspec
 
 from elm.event import Event, content_hash
-from elm.features import ends, fold, name_tokens
+from elm.features import Feature, ends, fold, name_tokens
 from elm.geometry import Region
 from elm.interval import Interval
 
@@ -94,7 +94,7 @@ def row(event: Event, *, types: Mapping[str, int], frames: Mapping[str, int], re
         *_place(event.subject, frames),
         texts(feature_tokens),
         texts(name_tokens(name for name, _ in event.features)),
-        msgspec.json.encode(event.features),
+        _features(event.features),
         None if event.agent is None else event.agent.encode(),
         None if payload is None else payload.media_type.encode(),
         None if payload is None else payload.data,
@@ -103,6 +103,21 @@ def row(event: Event, *, types: Mapping[str, int], frames: Mapping[str, int], re
         content_hash(event),
         _int8(ends(feature_tokens)),
     )
+
+
+def _features(features: Sequence[Feature]) -> bytes:
+    """The pairs as JSON, each number with all its digits: SQL compares what it reads there exactly."""
+    exact = [
+        (name, msgspec.Raw(f"{int(value)}.0".encode()))
+        if isinstance(value, float) and abs(value) >= _SHORTENED
+        else (name, value)
+        for name, value in features
+    ]
+    return msgspec.json.encode(exact)
+
+
+_SHORTENED = 2.0**53
+"""From here on floats are integers of which the shortest text that names them leaves digits out."""
 
 
 def _place(region: Region | None, frames: Mapping[str, int]) -> tuple[bytes | None, bytes | None]:

@@ -20,8 +20,10 @@ def encoded(arrivals: Sequence[Arrival], names: NameCache, now: datetime) -> lis
     """The rows of arrivals; unknown types are an error, new frames are added."""
     events = [arrival.event for arrival in arrivals]
     types = names.type_ids([event.type for event in events])
-    places = (place for event in events for place in (event.region, event.subject))
-    frames = names.frame_ids([place.frame for place in places if place is not None])
+    places = [(event, place.frame) for event in events for place in (event.region, event.subject) if place is not None]
+    frames = names.frame_ids([frame for event, frame in places if not event.parts])
+    # The frame of an extent that derives is there already, or the extent given is not the derived one.
+    frames = frames | {frame: names.frame_id(frame) for event, frame in places if event.parts}
     return [
         encoding.row(arrival.event, types=types, frames=frames, recorded_at=arrival.recorded_at or now)
         for arrival in arrivals

@@ -158,7 +158,8 @@ class MemoryStore:
         """How many candidates were judged, and what each condition keeps."""
         parts = conjuncts(query.cue)
         alone = [Query(cue=part) for part in parts]
-        left = [Query(cue=And(args=parts[: count + 1])) for count in range(len(parts))]
+        first = [Query(cue=part) for part in parts[:1]]
+        left = first + [Query(cue=And(args=parts[: count + 1])) for count in range(1, len(parts))]
         view, *views = self._views(query, *alone, *left)
         counts = [sum(1 for _ in each) for each in views]
         return Explanation(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
 from itertools import islice
@@ -25,6 +26,7 @@ from elm.storage.cue_compiler import CompiledCue, compile_cue
 from elm.storage.names import NameCache
 from elm.storage.rows import FRAME_ID, SUBJECT_FRAME_ID, TYPE_ID, decoders, moment
 from elm.store import (
+    MOST_ID,
     Arrival,
     BatchReport,
     ByFeature,
@@ -95,7 +97,12 @@ class PostgresStore:
                 event = arrival.event
                 found = event_writing.commit(connection, event, row, now)
                 done[event.uid] = found or self._same_or_refused(arrival, connection)
-        return [done[arrival.event.uid] for arrival in arrivals]
+        answers = []
+        for arrival in arrivals:
+            answers.append(done[arrival.event.uid])
+            # The same event once more in one call was there already.
+            done[arrival.event.uid] = replace(answers[-1], new=False)
+        return answers
 
     def _same_or_refused(self, arrival: Arrival, connection: Connection | None = None) -> Committed:
         """An event that was not taken is the one already stored, as it stands now, or refused."""
@@ -165,7 +172,8 @@ class PostgresStore:
         """The events with these ids, in id order; unknown ids are left out."""
         self._ready_to_recall()
         text = self._statements.text("by id", recall_statements.by_ids)
-        return list(self._events(text, {"ids": list(ids)}, at_once=True))
+        possible = [number for number in ids if 0 < number <= MOST_ID]
+        return list(self._events(text, {"ids": possible}, at_once=True))
 
     def groups(self, cue: Cue, by: Grouping | ByFeature) -> list[Group]:
         """The matching events by key, keys in ascending order, None last."""

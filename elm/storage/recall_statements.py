@@ -146,7 +146,7 @@ def _walked(compiled: CompiledCue, query: Query, near: Window) -> Any:
     index to its far end (377 ms where 6 would do). So: walk a bounded number of rows, and only where they
     do not fill the limit collect all candidates and sort them.
     """
-    limit = bindparam("limit", type_=Integer)
+    limit = bindparam("limit", type_=BigInteger)
     bounds: list[Condition] = []
     if near.begin is not None:
         bounds.append(begin(event) >= bindparam("near_begin", type_=_TIME))
@@ -212,7 +212,7 @@ def _order(query: Query, e: FromClause) -> list[ColumnElement[Any]]:
 
 def _ordered(statement: Select[Any], query: Query, e: FromClause, *, after: bool = True) -> Select[Any]:
     ordered = statement.order_by(*_order(query, e))
-    return ordered.limit(bindparam("limit", type_=Integer)) if after and query.limit is not None else ordered
+    return ordered.limit(bindparam("limit", type_=BigInteger)) if after and query.limit is not None else ordered
 
 
 # Sums over what matches
@@ -320,7 +320,9 @@ def by_ids() -> Select[Any]:
 STATISTICS = """
 SELECT (SELECT count(*) FROM event), (SELECT count(*) FROM event WHERE parts <> '{}'),
        (SELECT count(*) FROM event WHERE upper_inf(period)), (SELECT count(*) FROM part),
-       (SELECT count(*) FROM event_type), (SELECT count(*) FROM frame),
+       (SELECT count(*) FROM event_type),
+       (SELECT count(*) FROM frame f WHERE EXISTS (SELECT FROM event WHERE frame_id = f.id)
+        OR EXISTS (SELECT FROM event WHERE subject_frame_id = f.id AND subject IS NOT NULL)),
        (SELECT count(DISTINCT agent) FROM event), (SELECT min(lower(period)) FROM event),
        (SELECT max(lower(period)) FROM event), (SELECT max(recorded_at) FROM event),
        (SELECT coalesce(sum(pg_total_relation_size(c.oid)), 0)::bigint FROM pg_class c

@@ -138,7 +138,6 @@ def test_ten_thousand_features_are_kept_and_recalled(store: Store) -> None:
     assert found(store, cues.feature("same", "=", 999)) == [first.id]
 
 
-@pytest.mark.skip(reason="takes minutes in PostgresStore: time grows with the square of the number of features asked")
 def test_a_subset_of_ten_thousand_features_is_asked_for(store: Store) -> None:
     features = [(f"name {number}", number) for number in range(10_000)]
     tell(store, story(Event(type="Event", interval=span(0, 1), features=features[::1_000])))

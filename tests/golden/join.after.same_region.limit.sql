@@ -7,12 +7,12 @@ WHERE lower(event.period) >= %(near_begin)s::TIMESTAMP WITH TIME ZONE AND lower(
 WHERE (walk.period <@ tstzrange(%(p0)s::TIMESTAMP WITH TIME ZONE, %(p1)s::TIMESTAMP WITH TIME ZONE, '[]')) AND walk.type_id IN (SELECT type_closure.descendant_id
 FROM type_closure
 WHERE type_closure.ancestor_id = %(p2)s::INTEGER) ORDER BY lower(walk.period), walk.id
- LIMIT %(limit)s::INTEGER),
+ LIMIT %(limit)s::BIGINT),
 candidates AS MATERIALIZED
 (SELECT event.id AS id, event.period AS period
 FROM event
 WHERE (SELECT count(*) AS count_1
-FROM close) < %(limit)s::INTEGER AND (event.period <@ tstzrange(%(p0)s::TIMESTAMP WITH TIME ZONE, %(p1)s::TIMESTAMP WITH TIME ZONE, '[]')) AND event.type_id IN (SELECT type_closure.descendant_id
+FROM close) < %(limit)s::BIGINT AND (event.period <@ tstzrange(%(p0)s::TIMESTAMP WITH TIME ZONE, %(p1)s::TIMESTAMP WITH TIME ZONE, '[]')) AND event.type_id IN (SELECT type_closure.descendant_id
 FROM type_closure
 WHERE type_closure.ancestor_id = %(p2)s::INTEGER))
  SELECT a.id, nearest.id AS id_1
@@ -20,10 +20,10 @@ FROM (SELECT ids.id AS id
 FROM (SELECT close.id AS id, close.period AS period
 FROM close
 WHERE (SELECT count(*) AS count_1
-FROM close) >= %(limit)s::INTEGER UNION ALL SELECT sorted.id AS id, sorted.period AS period
+FROM close) >= %(limit)s::BIGINT UNION ALL SELECT sorted.id AS id, sorted.period AS period
 FROM (SELECT candidates.id AS id, candidates.period AS period
 FROM candidates ORDER BY lower(candidates.period), candidates.id
- LIMIT %(limit)s::INTEGER) AS sorted) AS ids ORDER BY lower(ids.period), ids.id) AS anchor JOIN event AS a ON a.id = anchor.id LEFT OUTER JOIN LATERAL (SELECT n.id AS id
+ LIMIT %(limit)s::BIGINT) AS sorted) AS ids ORDER BY lower(ids.period), ids.id) AS anchor JOIN event AS a ON a.id = anchor.id LEFT OUTER JOIN LATERAL (SELECT n.id AS id
 FROM event AS n
 WHERE n.agent = %(n0)s::VARCHAR AND lower(n.period) > upper(a.period) AND n.frame_id = a.frame_id AND ST_Intersects(n.region, a.region) ORDER BY lower(n.period), n.id
  LIMIT 1) AS nearest ON true ORDER BY lower(a.period), a.id

@@ -5,4 +5,4 @@ FROM type_closure
 WHERE type_closure.ancestor_id = %(p2)s::INTEGER) AND event.frame_id = (SELECT frame.id
 FROM frame
 WHERE frame.name = %(to_frame)s::VARCHAR) ORDER BY event.region <-> ST_GeomFromWKB(%(to)s), event.id
- LIMIT %(limit)s::INTEGER
+ LIMIT %(limit)s::BIGINT

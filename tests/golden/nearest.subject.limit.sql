@@ -7,4 +7,4 @@ FROM type_closure
 WHERE type_closure.ancestor_id = %(p2)s::INTEGER) AND event.subject_frame_id = (SELECT frame.id
 FROM frame
 WHERE frame.name = %(to_frame)s::VARCHAR) ORDER BY event.subject <-> ST_GeomFromWKB(%(to)s), event.id
- LIMIT %(limit)s::INTEGER
+ LIMIT %(limit)s::BIGINT

@@ -7,12 +7,12 @@ WHERE lower(event.period) >= %(near_begin)s::TIMESTAMP WITH TIME ZONE AND lower(
 WHERE (walk.period <@ tstzrange(%(p0)s::TIMESTAMP WITH TIME ZONE, %(p1)s::TIMESTAMP WITH TIME ZONE, '[]')) AND walk.type_id IN (SELECT type_closure.descendant_id
 FROM type_closure
 WHERE type_closure.ancestor_id = %(p2)s::INTEGER) ORDER BY lower(walk.period) DESC, walk.id DESC
- LIMIT %(limit)s::INTEGER),
+ LIMIT %(limit)s::BIGINT),
 candidates AS MATERIALIZED
 (SELECT event.id AS id, event.period AS period
 FROM event
 WHERE (SELECT count(*) AS count_1
-FROM close) < %(limit)s::INTEGER AND (event.period <@ tstzrange(%(p0)s::TIMESTAMP WITH TIME ZONE, %(p1)s::TIMESTAMP WITH TIME ZONE, '[]')) AND event.type_id IN (SELECT type_closure.descendant_id
+FROM close) < %(limit)s::BIGINT AND (event.period <@ tstzrange(%(p0)s::TIMESTAMP WITH TIME ZONE, %(p1)s::TIMESTAMP WITH TIME ZONE, '[]')) AND event.type_id IN (SELECT type_closure.descendant_id
 FROM type_closure
 WHERE type_closure.ancestor_id = %(p2)s::INTEGER))
  SELECT event.id, event.uid, event.type_id, event.period, event.frame_id, event.region AS region, event.subject_frame_id, event.subject AS subject, event.features, event.agent, event.media_type, event.payload, event.parts, array((SELECT up.whole_uid
@@ -21,7 +21,7 @@ WHERE up.part_id = event.id ORDER BY up.whole_id)) AS wholes, event.recorded_at
 FROM event JOIN (SELECT close.id AS id, close.period AS period
 FROM close
 WHERE (SELECT count(*) AS count_1
-FROM close) >= %(limit)s::INTEGER UNION ALL SELECT sorted.id AS id, sorted.period AS period
+FROM close) >= %(limit)s::BIGINT UNION ALL SELECT sorted.id AS id, sorted.period AS period
 FROM (SELECT candidates.id AS id, candidates.period AS period
 FROM candidates ORDER BY lower(candidates.period) DESC, candidates.id DESC
- LIMIT %(limit)s::INTEGER) AS sorted) AS ids ON ids.id = event.id ORDER BY lower(event.period) DESC, event.id DESC
+ LIMIT %(limit)s::BIGINT) AS sorted) AS ids ON ids.id = event.id ORDER BY lower(event.period) DESC, event.id DESC

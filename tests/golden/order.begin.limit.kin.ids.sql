@@ -11,12 +11,12 @@ FROM part AS step JOIN seen ON step.whole_id = seen.id)
  SELECT 1
 FROM seen JOIN event AS other ON other.id = seen.id
 WHERE other.uid != ALL (%(p0)s::UUID[]))) ORDER BY lower(walk.period), walk.id
- LIMIT %(limit)s::INTEGER),
+ LIMIT %(limit)s::BIGINT),
 candidates AS MATERIALIZED
 (SELECT event.id AS id, event.period AS period
 FROM event
 WHERE (SELECT count(*) AS count_1
-FROM close) < %(limit)s::INTEGER AND NOT (EXISTS (WITH RECURSIVE seen(id) AS
+FROM close) < %(limit)s::BIGINT AND NOT (EXISTS (WITH RECURSIVE seen(id) AS
 (SELECT part.part_id AS id
 FROM part
 WHERE part.whole_id = event.id UNION SELECT step.part_id AS part_id
@@ -28,7 +28,7 @@ WHERE other.uid != ALL (%(p0)s::UUID[]))))
 FROM (SELECT close.id AS id, close.period AS period
 FROM close
 WHERE (SELECT count(*) AS count_1
-FROM close) >= %(limit)s::INTEGER UNION ALL SELECT sorted.id AS id, sorted.period AS period
+FROM close) >= %(limit)s::BIGINT UNION ALL SELECT sorted.id AS id, sorted.period AS period
 FROM (SELECT candidates.id AS id, candidates.period AS period
 FROM candidates ORDER BY lower(candidates.period), candidates.id
- LIMIT %(limit)s::INTEGER) AS sorted) AS ids ORDER BY lower(ids.period), ids.id
+ LIMIT %(limit)s::BIGINT) AS sorted) AS ids ORDER BY lower(ids.period), ids.id

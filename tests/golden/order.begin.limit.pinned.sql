@@ -3,4 +3,4 @@ FROM part AS up
 WHERE up.part_id = event.id ORDER BY up.whole_id)) AS wholes, event.recorded_at
 FROM event
 WHERE event.uid = ANY (%(p0)s::UUID[]) ORDER BY lower(event.period), event.id
- LIMIT %(limit)s::INTEGER
+ LIMIT %(limit)s::BIGINT

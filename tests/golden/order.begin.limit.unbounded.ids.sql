@@ -4,17 +4,17 @@ FROM (SELECT event.id AS id, event.uid AS uid, event.type_id AS type_id, event.p
 FROM event ORDER BY lower(event.period), event.id
  LIMIT %(walk)s::INTEGER) AS walk
 WHERE walk.agent = %(p0)s::VARCHAR ORDER BY lower(walk.period), walk.id
- LIMIT %(limit)s::INTEGER),
+ LIMIT %(limit)s::BIGINT),
 candidates AS MATERIALIZED
 (SELECT event.id AS id, event.period AS period
 FROM event
 WHERE (SELECT count(*) AS count_1
-FROM close) < %(limit)s::INTEGER AND event.agent = %(p0)s::VARCHAR)
+FROM close) < %(limit)s::BIGINT AND event.agent = %(p0)s::VARCHAR)
  SELECT ids.id
 FROM (SELECT close.id AS id, close.period AS period
 FROM close
 WHERE (SELECT count(*) AS count_1
-FROM close) >= %(limit)s::INTEGER UNION ALL SELECT sorted.id AS id, sorted.period AS period
+FROM close) >= %(limit)s::BIGINT UNION ALL SELECT sorted.id AS id, sorted.period AS period
 FROM (SELECT candidates.id AS id, candidates.period AS period
 FROM candidates ORDER BY lower(candidates.period), candidates.id
- LIMIT %(limit)s::INTEGER) AS sorted) AS ids ORDER BY lower(ids.period), ids.id
+ LIMIT %(limit)s::BIGINT) AS sorted) AS ids ORDER BY lower(ids.period), ids.id

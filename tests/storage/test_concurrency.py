@@ -58,8 +58,9 @@ class Robots:
     """One memory, written to over several connections, and looked at from outside."""
 
     def __init__(self, dsn: str, opened: ExitStack) -> None:
-        # A writer that waits for ever is a failure, not a hanging test.
-        self._dsn = psycopg.conninfo.make_conninfo(dsn, options="-c lock_timeout=20s")
+        # A writer that waits for ever is a failure, not a hanging test; those that wait for each other soon know.
+        options = "-c lock_timeout=20s -c deadlock_timeout=20ms"
+        self._dsn = psycopg.conninfo.make_conninfo(dsn, options=options)
         self._opened = opened
         watch = psycopg.connect(dsn, autocommit=True, options=f"-c search_path={MEMORY}")
         self._watch = opened.enter_context(watch)

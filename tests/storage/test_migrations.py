@@ -154,7 +154,8 @@ def test_catalogue_tells_schemas_apart(dsn: str, declared: str) -> None:
 def _is_ours(entry: Any, name: str | None, kind: str, reflected: bool, compared: Any) -> bool:
     if kind == "table" and name in ("alembic_version", "spatial_ref_sys"):
         return False
-    return bool(alembic_helpers.include_object(entry, name, kind, reflected, compared))
+    shown: bool = alembic_helpers.include_object(entry, name, kind, reflected, compared)  # type: ignore[no-untyped-call]
+    return shown
 
 
 def _is_other_type(_context: Any, _column: Any, _declared: Any, found: Any, declared: Any) -> bool | None:

@@ -1,9 +1,9 @@
-"""What the server does for each kind of question in a memory of 100,000 events: read from the plans as they were run."""
+"""What the server does for each kind of question in a memory of 100,000 events, read from the plans that it ran."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 from itertools import islice
@@ -19,7 +19,7 @@ from elm.geometry import Region
 from elm.interval import Interval
 from elm.storage import recall_statements
 from elm.storage.postgres import PostgresStore
-from elm.store import Arrival, Nearest, Order, Query
+from elm.store import Arrival, Cursor, Nearest, Order, Query
 from simulators import hierarchy
 from simulators.events import World, simulate
 from tests.servers import MEMORY, Server
@@ -68,6 +68,7 @@ class Life:
     event: StoredEvent
     whole: StoredEvent
     visit: StoredEvent
+    going_on: StoredEvent
     last: StoredEvent
 
     @property
@@ -86,14 +87,20 @@ def life(postgres_server: Server) -> Iterator[Life]:
         memory.add_type("Inspection")
         report = memory.load(_life(), batch=10_000)
         assert (report.new, report.refused) == (EVENTS, 0)
-        middle = (event for event in memory.recall(order="id", after=None, limit=EVENTS // 2 + 100) if not event.parts)
-        event = next(each for each in islice(middle, 40_000, None) if each.interval.duration and each.wholes)
+        window = cues.time("subset", World().begin + timedelta(hours=20), World().begin + timedelta(hours=21))
+        event = next(
+            each
+            for each in memory.recall(window)
+            if each.interval.duration and each.wholes and memory.recall(cues.is_a(each.type)).count() <= FEW_ROWS // 2
+        )
         (whole,) = memory.recall(cues.uid(*event.wholes))
-        visit = next(each for each in memory.recall(cues.exactly("Inspection")) if each.subject is not None)
+        visits = [each for each in memory.recall(cues.exactly("Inspection")) if each.subject is not None]
+        visit = next(each for each in visits if each.interval.duration)
+        going_on = next(each for each in visits if each.interval.is_open)
         first, last = memory.recall().first(), memory.recall().last()
         assert first is not None
         assert last is not None
-        yield Life(store=store, first=first, event=event, whole=whole, visit=visit, last=last)
+        yield Life(store=store, first=first, event=event, whole=whole, visit=visit, going_on=going_on, last=last)
         store.close()
 
 
@@ -148,12 +155,6 @@ def _text_of(store: PostgresStore, build: Callable[..., Any], cue: Cue) -> tuple
 # Few rows
 
 
-def _around(life: Life, before: float = 0, after: float = 0) -> tuple[datetime, datetime]:
-    """The middle event's interval, moved out (or in) by some seconds at either end."""
-    begin, end = life.interval
-    return begin - before * _SECOND, end + after * _SECOND
-
-
 def _inside(life: Life) -> datetime:
     begin, end = life.interval
     return begin + (end - begin) / 2
@@ -161,52 +162,66 @@ def _inside(life: Life) -> datetime:
 
 Ask = Callable[[Life], Cue]
 _SETS = (SetRelation.EQUAL, SetRelation.SUBSET, SetRelation.SUPERSET, SetRelation.INTERSECTS)
+# Whatever has no parts is a subset of any: few rows can never be the answer.
+_FEW_KIN = (SetRelation.EQUAL, SetRelation.SUPERSET, SetRelation.INTERSECTS)
 
 
-def _by_sets(build: Callable[..., Cue], value: Callable[[Life], Any], name: str) -> dict[str, Ask]:
-    return {f"{name}.{relation}": lambda life, r=relation: build(r, value(life)) for relation in _SETS}  # type: ignore[misc]
+def _by(
+    name: str, build: Callable[..., Cue], value: Callable[[Life], Any], relations: Iterable[str], **more: Any
+) -> dict[str, Ask]:
+    """Cues of several relations to one value."""
+
+    def ask(relation: str) -> Ask:
+        return lambda life: build(relation, value(life), **more)
+
+    return {f"{name}.{relation}": ask(relation) for relation in relations}
+
+
+def _region(event: StoredEvent) -> Region:
+    assert event.region is not None
+    return event.region
+
+
+def _subject(event: StoredEvent) -> Region:
+    assert event.subject is not None
+    return event.subject
+
+
+def _payload(event: StoredEvent) -> bytes:
+    assert event.payload is not None
+    return event.payload.data
 
 
 def _names(event: StoredEvent) -> list[str]:
     return [name for name, _ in event.features]
 
 
-def _serial(life: Life) -> list[tuple[str, int]]:
-    return [("serial", 80), ("serial", 160)]
-
-
 FEW: Mapping[str, Ask] = {
     "type.exactly": lambda life: cues.exactly(life.event.type),
     "type.is_a": lambda life: cues.is_a(life.event.type),
-    "payload.equal": lambda life: cues.payload(life.event.payload.data if life.event.payload else b""),
-    **_by_sets(cues.time, lambda life: life.event.interval, "time"),
-    **_by_sets(cues.region, lambda life: life.event.region, "region"),
-    **_by_sets(cues.subject, lambda life: life.visit.subject, "subject"),
-    **_by_sets(cues.features, lambda life: life.event.features, "features"),
-    **_by_sets(cues.feature_names, lambda life: _names(life.event), "feature_names"),
-    "features.intersects": lambda life: cues.features("intersects", _serial(life)),
+    "payload.equal": lambda life: cues.payload(_payload(life.event)),
+    **_by("time", cues.time, lambda life: life.event.interval, _SETS),
+    **_by("region", cues.region, lambda life: _region(life.visit), _SETS),
+    **_by("parts", cues.parts, lambda life: life.whole.parts, _FEW_KIN),
+    **_by("wholes", cues.wholes, lambda life: life.event.wholes, _FEW_KIN),
+    **_by("features", cues.features, lambda life: life.event.features, _SETS),
+    "features.intersects": lambda life: cues.features("intersects", [("serial", 80), ("serial", 160)]),
+    **_by("feature_names", cues.feature_names, lambda life: _names(life.event), _SETS),
     "feature_names.intersects": lambda life: cues.feature_names("intersects", ["serial"]),
-    **{
-        f"parts.{relation}": lambda life, r=relation: cues.parts(r, life.whole.parts)  # type: ignore[misc]
-        for relation in _SETS
-        if relation is not SetRelation.SUBSET
-    },
-    **{
-        f"wholes.{relation}": lambda life, r=relation: cues.wholes(r, life.event.wholes)  # type: ignore[misc]
-        for relation in _SETS
-        if relation is not SetRelation.SUBSET
-    },
-    **{
-        f"parts.{relation}, transitive": lambda life, r=relation: cues.parts(r, life.whole.parts, transitive=True)  # type: ignore[misc]
-        for relation in _SETS
-        if relation is not SetRelation.SUBSET
-    },
-    **{
-        f"wholes.{relation}, transitive": lambda life, r=relation: cues.wholes(r, life.event.wholes, transitive=True)  # type: ignore[misc]
-        for relation in _SETS
-        if relation is not SetRelation.SUBSET
-    },
-    # Allen's relations to a window of the event's own size, and to one that reaches to the end of the memory.
+    # Beyond the paper's classes.
+    **_by("subject", cues.subject, lambda life: _subject(life.visit), _SETS),
+    **_by("parts, transitive", cues.parts, lambda life: life.whole.parts, _FEW_KIN, transitive=True),
+    **_by("wholes, transitive", cues.wholes, lambda life: life.event.wholes, _FEW_KIN, transitive=True),
+    **_by("recorded_at", cues.recorded, lambda life: Interval.at(life.event.recorded_at), _SETS),
+    "recorded_at.before": lambda life: cues.recorded("before", life.first.recorded_at + 9 * _SECOND, None),
+    "recorded_at.after": lambda life: cues.recorded("after", None, life.last.recorded_at - 2 * _SECOND),
+    "recorded_at.during": lambda life: cues.recorded(
+        "during", life.event.recorded_at - _SECOND, life.event.recorded_at + _SECOND
+    ),
+    "recorded_at.disjoint": lambda life: cues.recorded(
+        "disjoint", life.first.recorded_at + 2 * _SECOND, life.last.recorded_at - _SECOND
+    ),
+    # Allen's relations to a window of the event's own size, to one as long as the memory, and to one without end.
     "time.before": lambda life: cues.time("before", life.first.interval.begin + 9 * _SECOND, None),
     "time.after": lambda life: cues.time("after", None, life.last.interval.begin - 5 * _SECOND),
     "time.meets": lambda life: cues.time("meets", life.interval[1], life.interval[1] + _SECOND),
@@ -217,65 +232,72 @@ FEW: Mapping[str, Ask] = {
     "time.overlapped_by, long": lambda life: cues.time("overlapped_by", life.first.interval.begin, _inside(life)),
     "time.starts": lambda life: cues.time("starts", life.interval[0], life.interval[1] + _SECOND),
     "time.started_by": lambda life: cues.time("started_by", life.interval[0], _inside(life)),
-    "time.during": lambda life: cues.time("during", *_around(life, 0.01, 0.01)),
+    "time.during": lambda life: cues.time("during", life.interval[0] - _INSTANT, life.interval[1] + _INSTANT),
     "time.contains": lambda life: cues.time("contains", _inside(life), _inside(life)),
     "time.finishes": lambda life: cues.time("finishes", life.interval[0] - _SECOND, life.interval[1]),
     "time.finishes, open": lambda life: cues.time("finishes", life.first.interval.begin - _SECOND, None),
     "time.finished_by": lambda life: cues.time("finished_by", _inside(life), life.interval[1]),
-    "time.finished_by, open": lambda life: cues.time("finished_by", life.last.interval.begin, None),
+    "time.finished_by, open": lambda life: cues.time("finished_by", life.last.interval.begin + _SECOND, None),
     "time.equals": lambda life: cues.time("equals", life.event.interval),
-    "time.equals, open": lambda life: cues.time("equals", life.last.interval.begin, None),
+    "time.equals, open": lambda life: cues.time("equals", life.going_on.interval),
     "time.disjoint": lambda life: cues.time(
         "disjoint", life.first.interval.begin + 4 * _SECOND, life.last.interval.begin - _SECOND
     ),
-    **{
-        f"recorded_at.{relation}": lambda life, r=relation: cues.recorded(
-            r, life.event.recorded_at, life.event.recorded_at
-        )  # type: ignore[misc]
-        for relation in _SETS
-    },
-    "recorded_at.before": lambda life: cues.recorded("before", life.first.recorded_at + 9 * _SECOND, None),
-    "recorded_at.after": lambda life: cues.recorded("after", None, life.last.recorded_at - 2 * _SECOND),
-    "recorded_at.during": lambda life: cues.recorded(
-        "during", life.event.recorded_at - _SECOND, life.event.recorded_at + _SECOND
-    ),
-    "recorded_at.disjoint": lambda life: cues.recorded(
-        "disjoint", life.first.recorded_at + 2 * _SECOND, life.last.recorded_at - _SECOND
-    ),
-    "region.touches": lambda life: cues.region("touches", life.event.region or _NOWHERE),
-    "region.within_distance": lambda life: cues.within(0.01, life.visit.region or _NOWHERE),
-    "subject.touches": lambda life: cues.subject("touches", life.visit.subject or _NOWHERE),
-    "subject.within_distance": lambda life: cues.subject_within(0.1, life.visit.subject or _NOWHERE),
+    "region.within_distance": lambda life: cues.within(0.01, _region(life.visit)),
+    "subject.within_distance": lambda life: cues.subject_within(0.1, _subject(life.visit)),
     "feature.=": lambda life: cues.feature("serial", "=", 80),
     "feature.>": lambda life: cues.feature("serial", ">", 80),
     "feature.!=": lambda life: cues.feature("serial", "!=", 80),
     "agent": lambda life: cues.agent("visitor"),
     "uid": lambda life: cues.uid(life.event.uid, life.whole.uid, life.last.uid),
     "and": lambda life: cues.time("intersects", life.event.interval) & cues.exactly(life.event.type),
-    "and, one of them wide": lambda life: (
-        cues.is_a("type-3") & cues.time("intersects", life.event.interval) & cues.feature_names("superset", ["object"])
+    "and, all but one wide": lambda life: (
+        cues.is_a(life.event.type.partition(".")[0])
+        & cues.time("intersects", life.event.interval)
+        & cues.feature_names("superset", _names(life.event)[:1])
+        & cues.agent("robot")
     ),
-    "and, a wide comparison": lambda life: cues.uid(life.event.uid) & ~cues.feature("speed", ">", 1_000),
-    "or": lambda life: cues.agent("visitor") | cues.uid(life.event.uid),
+    "and, one without index": lambda life: cues.uid(life.event.uid) & cues.lasting(">", timedelta(0)),
     "and, not": lambda life: cues.time("intersects", life.event.interval) & ~cues.agent("visitor"),
+    "or": lambda life: cues.agent("visitor") | cues.uid(life.event.uid),
 }
-"""Cues that few events match: those of the paper's classes that can be, and one at least of every other kind."""
+"""Cues that a few events match: of every kind for which that can be, and that an index serves."""
 
-_NOWHERE = Region.box(-9, -9, -8, -8, frame="annex")
+
+_UNSOLVED = pytest.mark.xfail(reason="every event that shares a name with the cue is visited", strict=True)
 
 
 @pytest.mark.parametrize("limit", [None, FEW_ROWS])
-@pytest.mark.parametrize("name", FEW)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=_UNSOLVED if name == "feature_names.subset" else ()) for name in FEW]
+)
 def test_few_rows_are_found_in_few_buffers(life: Life, name: str, limit: int | None) -> None:
     cue = FEW[name](life)
     costs = [cost(life.store, Query(cue=cue, order=order, limit=limit)) for order in _ORDERS]
-    assert all(each.rows <= FEW_ROWS for each in costs), f"the cue is no example: {costs[0]}"
+    assert all(0 < each.rows <= FEW_ROWS for each in costs), f"the cue is no example: {costs[0]}"
     assert [str(each) for each in costs if each.buffers >= FEW_BUFFERS or each.scanned] == []
 
 
-def test_the_cues_find_something(life: Life) -> None:
-    nothing = [name for name, ask in FEW.items() if not life.store.count(ask(life))]
-    assert nothing == ["region.touches", "subject.touches"]
+# What no index serves: cues of few rows that are found by reading all events, or all that one name or frame has.
+WITHOUT_INDEX: Mapping[str, Ask] = {
+    "feature.>": lambda life: cues.feature("speed", ">", 1_000),
+    "feature.like": lambda life: cues.feature("object", "like", "no such thing%"),
+    "duration.>": lambda life: cues.lasting(">", timedelta(minutes=30)),
+    "not": lambda life: ~cues.time("intersects", life.first.interval.begin, life.last.interval.begin),
+    "region.disjoint": lambda life: cues.region("disjoint", Region.box(-9, -9, 209, 209)),
+    "parts.disjoint": lambda life: cues.parts("disjoint", []) & cues.lasting(">", timedelta(minutes=30)),
+}
+
+
+@pytest.mark.parametrize("limit", [None, FEW_ROWS])
+@pytest.mark.parametrize("name", WITHOUT_INDEX)
+def test_without_an_index_no_page_is_read_twice(life: Life, name: str, limit: int | None) -> None:
+    with life.store._connections.recalling() as connection:
+        ((pages,),) = connection.execute("SELECT relpages FROM pg_class WHERE oid = 'event'::regclass").fetchall()
+    for order in _ORDERS:
+        found = cost(life.store, Query(cue=WITHOUT_INDEX[name](life), order=order, limit=limit))
+        assert found.rows <= FEW_ROWS
+        assert found.buffers < 1.2 * pages, f"{order}: {found} of {pages} pages"
 
 
 # The first of many rows
@@ -294,21 +316,21 @@ MANY: Mapping[str, Ask] = {
     "wholes.subset, transitive": lambda life: cues.wholes("subset", life.event.wholes, transitive=True),
     "parts.disjoint": lambda life: cues.parts("disjoint", life.whole.parts),
     "feature_names.intersects": lambda life: cues.feature_names("intersects", ["object", "door", "force"]),
-    "feature.like": lambda life: cues.feature("object", "like", "%o%"),
+    "feature.like": lambda life: cues.feature("object", "like", "%"),
     "agent": lambda life: cues.agent("robot"),
     "duration.>": lambda life: cues.lasting(">", _SECOND),
     "not": lambda life: ~cues.agent("visitor"),
 }
-"""Cues that many events match, all along."""
+"""Cues that many events match, most of them not the very last."""
 
 
 @pytest.mark.parametrize("name", MANY)
-def test_first_rows_of_many_are_found_in_few_buffers(life: Life, name: str) -> None:
+def test_first_rows_of_many_are_found_by_a_bounded_walk(life: Life, name: str) -> None:
     cue = MANY[name](life)
     assert life.store.count(cue) > 5_000
     costs = [cost(life.store, Query(cue=cue, order=order, limit=FEW_ROWS)) for order in _ORDERS]
     assert all(each.rows == FEW_ROWS for each in costs)
-    assert [str(each) for each in costs if each.buffers >= FEW_BUFFERS or each.scanned] == []
+    assert [str(each) for each in costs if each.buffers >= 1_500 or each.scanned] == []
 
 
 # What correlates with time
@@ -371,7 +393,7 @@ def test_nearest_is_bounded_by_the_hits(life: Life, name: str, place: Place) -> 
     cue = CORRELATED[name](life)
     here = {Place.REGION: life.event.region, Place.SUBJECT: life.visit.subject}[place]
     assert here is not None
-    for to in (here, Region.around(100, 100, 1, frame="annex"), Region.around(100, 100, 1, frame="unknown")):
+    for to in (here, Region.around(100, 100, 1, frame="annex"), Region.around(100, 100, 1, frame="nowhere")):
         found = cost(life.store, Query(cue=cue, order=Nearest(to=to, place=place), limit=10))
         assert found.buffers < 1_000, f"{to.frame}: {found}"
 
@@ -387,8 +409,6 @@ def test_nearest_walks_the_index(life: Life) -> None:
 @pytest.mark.parametrize("order", Order)
 def test_paging_goes_on_where_it_ended(life: Life, order: Order) -> None:
     """A page deep in the memory costs what the first one does."""
-    from elm.store import Cursor
-
     first = cost(life.store, Query(order=order, limit=100))
     deep = cost(life.store, Query(order=order, limit=100, after=Cursor.after(life.event)))
     assert deep.rows == 100
@@ -427,34 +447,30 @@ _PREPARED = "SELECT statement, generic_plans, custom_plans FROM pg_prepared_stat
 
 
 @pytest.mark.parametrize("limit", [None, 100])
-def test_recalls_that_repeat_keep_their_plans(life: Life, limit: int | None) -> None:
-    """The driver prepares what is run often; the server must not make a plan for any values of it then."""
-    place = life.event.region
-    assert place is not None
-    narrow, wide = cues.region("intersects", place), cues.region("subset", Region.box(-1, -1, 201, 201))
-    query = Query(cue=wide & cues.time("subset", *_around(life, 300, 300)), limit=limit)
-    before = cost(life.store, query)
+def test_recalls_that_repeat_are_still_planned_for_their_values(life: Life, limit: int | None) -> None:
+    """The driver prepares what is run often; then the server must not plan it for any values there may be."""
+    narrow, wide = cues.region("intersects", _region(life.event)), cues.region("subset", Region.box(-1, -1, 201, 201))
+    before = [cost(life.store, Query(cue=cue, limit=limit)) for cue in (narrow, wide)]
     for _ in range(10):
-        assert len(list(life.store.find(query))) == before.rows
-        list(life.store.find(Query(cue=narrow, limit=limit)))
+        for cue, known in zip((narrow, wide), before, strict=True):
+            assert len(list(life.store.find(Query(cue=cue, limit=limit)))) == known.rows
     with life.store._connections.recalling() as connection:
-        prepared = [
-            row
-            for row in connection.execute(_PREPARED).fetchall()
-            if "feature_ends" in row[0] or "FROM event" in row[0]
-        ]
-    assert [row for row in prepared if row[1]] == []
-    assert cost(life.store, query).buffers <= before.buffers
+        prepared = connection.execute(_PREPARED).fetchall()
+    recalls = [row for row in prepared if "ST_CoveredBy" in row[0]]
+    assert limit is None or recalls
+    assert [(generic, custom >= 4) for _, generic, custom in recalls] == [(0, True)] * len(recalls)
+    for cue, known in zip((narrow, wide), before, strict=True):
+        assert cost(life.store, Query(cue=cue, limit=limit)).buffers < 1.1 * known.buffers + 5
 
 
-def test_commits_that_repeat_keep_their_plan(life: Life) -> None:
+def test_commits_that_repeat_are_planned_once(life: Life) -> None:
     begin = life.last.interval.begin + 9 * _SECOND
-    parts = [Event(type="Inspection", interval=Interval.at(begin + n * _SECOND)) for n in range(10)]
-    for part in parts:
+    for number in range(10):
+        part = Event(type="Inspection", interval=Interval.at(begin + number * _SECOND))
         life.store.commit(Arrival(event=part))
         life.store.commit(Arrival(event=Event(type="Inspection", parts=[part.uid])))
     with life.store._connections.writing() as connection:
         prepared = connection.execute(_PREPARED).fetchall()
     inserts = [row for row in prepared if "INSERT INTO event" in row[0]]
-    assert len(inserts) == 2
-    assert all(generic >= 10 and custom == 0 for _, generic, custom in inserts)
+    assert sum(generic >= 10 for _, generic, _ in inserts) == 2
+    assert [custom for _, _, custom in inserts] == [0] * len(inserts)

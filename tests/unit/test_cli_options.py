@@ -13,7 +13,6 @@ from typer.testing import CliRunner
 
 from elm import cues, errors
 from elm.cli.cue_options import CueOptions
-from elm.cli.diagnosis import masked
 from elm.cli.event_table import contents, feature, lasting
 from elm.cli.exits import ExitCode, exit_code, message
 from elm.cli.naming import event_name
@@ -23,6 +22,7 @@ from elm.cues.algebra import And, RegionCue
 from elm.errors import ElmError
 from elm.event import Payload
 from elm.geometry import Region
+from elm.storage.diagnosis import masked
 from tests.clock import at
 
 BEGIN, END = "2026-01-01T10:00:00Z", "2026-01-01T10:00:09Z"

@@ -137,6 +137,17 @@ def test_a_begin_that_is_no_datetime_is_refused(given: object) -> None:
         Interval(begin=given, end=None)  # type: ignore[arg-type]
 
 
+class _Stamp(datetime):
+    """A moment of a class of its own, as data frames have them, which may hold finer digits."""
+
+
+def test_a_moment_of_a_derived_class_becomes_a_plain_datetime() -> None:
+    stamp = _Stamp(2026, 1, 1, 10, tzinfo=UTC)
+
+    assert type(Interval(begin=stamp, end=stamp).begin) is datetime
+    assert type(Window(begin=stamp).begin) is datetime
+
+
 def test_a_moment_before_year_1_in_utc_is_refused() -> None:
     early = datetime(1, 1, 1, tzinfo=timezone(timedelta(hours=14)))
     late = datetime(9999, 12, 31, 23, tzinfo=timezone(timedelta(hours=-14)))

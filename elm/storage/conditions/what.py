@@ -40,7 +40,7 @@ def features(cue: FeaturesCue) -> Rule:
     """An event's set of features against a given set."""
     given = tokens(cue.features)
     rule = _text_set("features", cue.relation, given, "feature_tokens")
-    if cue.relation is not SetRelation.SUBSET:
+    if cue.relation is not SetRelation.SUBSET or len(given) > _MOST_ENDS:
         return rule
     # The inverted index would visit all events that share a token, the ends find the few that may lie within;
     # IS TRUE keeps the planner from taking the former.
@@ -49,7 +49,11 @@ def features(cue: FeaturesCue) -> Rule:
     def build(e: FromClause, p: Bind, within: Bind) -> Condition:
         return and_(rule.build(e, p).is_(true()), e.c.feature_ends == any_(within))
 
-    return Rule(rule.key, values, build)
+    return Rule((*rule.key, "by ends"), values, build)
+
+
+_MOST_ENDS = 50
+"""Elements of a set up to which its pairs of ends, some thousand, are fewer than what shares an element."""
 
 
 def _text_set(op: str, relation: SetRelation, given: list[str], name: str) -> Rule:
