@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import random
 import re
 import select
+import time
 import weakref
 from collections import deque
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from functools import wraps
 from threading import Lock
-from typing import Any
+from typing import Any, ParamSpec, TypeVar
 from weakref import WeakSet
 
 import psycopg
@@ -26,6 +29,8 @@ from elm.errors import (
 )
 
 Connection = psycopg.Connection[Any]
+_P = ParamSpec("_P")
+_T = TypeVar("_T")
 
 MINIMUM_SERVER = 14
 """The oldest PostgreSQL that has multiranges, from which the span of a complex event is derived."""
@@ -59,6 +64,28 @@ def translated(memory: str) -> Iterator[None]:
         raise _translate(error, memory) from error
 
 
+class TransactionUndone(StoreFailure):
+    """The server undid a transaction so that another could go on, or it must be begun anew to see what another did."""
+
+
+_ATTEMPTS = 10
+
+
+def repeated(call: Callable[_P, _T]) -> Callable[_P, _T]:
+    """`call`, which is one transaction, begun anew as often as the server undid it."""
+
+    @wraps(call)
+    def run(*args: _P.args, **named: _P.kwargs) -> _T:
+        for attempt in range(1, _ATTEMPTS):
+            with suppress(TransactionUndone):
+                return call(*args, **named)
+            # Out of step with the other, or both would be undone again.
+            time.sleep(random.uniform(0, 0.02 * attempt))  # noqa: S311 - nothing secret
+        return call(*args, **named)
+
+    return run
+
+
 def _translate(error: psycopg.Error, memory: str) -> ElmError:
     said = str(error.diag.message_primary or error).strip()
     match error:
@@ -75,6 +102,8 @@ def _translate(error: psycopg.Error, memory: str) -> ElmError:
             return DatabaseUnfit(f"the database is read-only: {said}. Connect to the primary server to write")
         case psycopg.errors.QueryCanceled():
             return StoreFailure(f"the database cancelled a statement: {said}")
+        case psycopg.errors.DeadlockDetected() | psycopg.errors.SerializationFailure():
+            return TransactionUndone(f"writers of memory {memory!r} kept waiting for each other: {said}. Try again")
         case psycopg.OperationalError() | psycopg.InterfaceError():
             return DatabaseUnreachable(f"the connection to the database was lost: {said}. Try again")
         case _:
@@ -87,7 +116,7 @@ def _translate(error: psycopg.Error, memory: str) -> ElmError:
 def open_connection(dsn: str, settings: dict[str, str], *, memory: str | None = None) -> Connection:
     """A connection in autocommit mode whose search_path leads into `memory`."""
     try:
-        _check_password(dsn)
+        check_password(dsn)
         connection = psycopg.connect(dsn, autocommit=True, fallback_application_name="elm", client_encoding="UTF8")
     except psycopg.ProgrammingError as error:
         # libpq repeats what it does not understand, which may be the password or a part of it.
@@ -132,8 +161,8 @@ _PASSWORD = re.compile(r"://[^/@]*:.*@|\bpassword", re.DOTALL)
 """What tells that there is a password in a DSN, in any of its forms, also in one that libpq cannot parse."""
 
 
-def _check_password(dsn: str) -> None:
-    """Refuse a URI whose password libpq would take for a host, a port or a database, and show as such."""
+def check_password(dsn: str) -> None:
+    """Refuse a URI of whose password libpq would take a part for a host, a port or a database, and show it as such."""
     known = psycopg.conninfo.conninfo_to_dict(dsn)
     # An @ in front is an abstract socket.
     if "@" in str(known.get("host", ""))[1:] or not str(known.get("port") or 1).replace(",", "").isdigit():

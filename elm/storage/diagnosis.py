@@ -7,9 +7,9 @@ from functools import partial
 
 import psycopg
 
-from elm.errors import ElmError
+from elm.errors import DatabaseUnreachable, ElmError
 from elm.storage import IN_PROCESS, resolve_dsn, schema
-from elm.storage.connections import RECALLING, Connection, open_connection
+from elm.storage.connections import RECALLING, Connection, check_password, open_connection
 from elm.storage.tables import REVISION
 
 _SETTINGS = """
@@ -64,7 +64,8 @@ def masked(dsn: str) -> str:
         return dsn
     try:
         known = psycopg.conninfo.conninfo_to_dict(dsn)
-    except psycopg.ProgrammingError:
+        check_password(dsn)
+    except (psycopg.ProgrammingError, DatabaseUnreachable):
         return "not shown: it is no DSN that libpq can read"
     return " ".join(f"{name}={'***' if 'password' in name else value}" for name, value in known.items())
 

@@ -11,7 +11,7 @@ from elm.errors import ConflictingContent, CycleRefused, ExtentRefused, InvalidV
 from elm.event import Event, StoredEvent, content_hash
 from elm.storage import encoding, prepared
 from elm.storage import write_statements as sql
-from elm.storage.connections import Connection
+from elm.storage.connections import Connection, TransactionUndone
 from elm.storage.names import NameCache
 from elm.store import Arrival, Closed, Committed
 
@@ -80,7 +80,8 @@ def why_refused(event: Event, parts: Iterable[StoredEvent]) -> Exception:
             f"an extent given for the complex event {event.uid} is not the one its parts have: leave interval, "
             f"region and subject out, they derive; commit an instant event as a part for a bound that no part has"
         )
-    return ConflictingContent(f"event {event.uid} was being written by another process just now: try again")
+    # Nothing speaks against it any more: its parts were committed since it was refused.
+    return TransactionUndone(f"event {event.uid} and its parts were written by several processes at once: try again")
 
 
 def refuse_other(event: Event, stored: StoredEvent) -> None:

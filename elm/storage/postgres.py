@@ -21,7 +21,7 @@ from elm.interval import Window
 from elm.storage import batch_loading, event_writing, grouping, hints, recall_statements, schema, type_writing
 from elm.storage import write_statements as sql
 from elm.storage.batch import made_ready
-from elm.storage.connections import Connection, Connections
+from elm.storage.connections import Connection, Connections, repeated
 from elm.storage.cue_compiler import CompiledCue, compile_cue
 from elm.storage.names import NameCache
 from elm.storage.rows import FRAME_ID, SUBJECT_FRAME_ID, TYPE_ID, decoders, moment
@@ -76,6 +76,7 @@ class PostgresStore:
 
     # Writing
 
+    @repeated
     def commit(self, arrival: Arrival) -> Committed:
         """Keep one event whose parts are all in the memory."""
         self._ready_to_write()
@@ -85,6 +86,7 @@ class PostgresStore:
             done = event_writing.commit(connection, arrival.event, row, now)
         return done or self._same_or_refused(arrival)
 
+    @repeated
     def commit_all(self, arrivals: Sequence[Arrival]) -> list[Committed]:
         """Keep all or none; events may be parts of each other in any order."""
         self._ready_to_write()
@@ -116,6 +118,7 @@ class PostgresStore:
             return Committed(id=stored[event.uid].id, uid=event.uid, new=False)
         raise event_writing.why_refused(event, stored.values())
 
+    @repeated
     def load(self, arrivals: Sequence[Arrival]) -> BatchReport:
         """Keep what can be kept of a batch whose parts come before their wholes or are in the memory."""
         self._ready_to_write()
@@ -131,6 +134,7 @@ class PostgresStore:
         with self._connections.writing() as connection:
             connection.execute(sql.ANALYZE)
 
+    @repeated
     def close_event(self, uid: UUID, end: datetime) -> Closed:
         """End an open event and recompute the extents of all its wholes; the same end again changes nothing."""
         self._ready_to_write()

@@ -92,13 +92,13 @@ def columns(e: FromClause) -> list[ColumnElement[Any]]:
 
 # Which events, in which order
 
-WALK_FEWEST, WALK_MOST, WALK_FACTOR = 100, 2_000, 20
+WALK_FEWEST, WALK_MOST, WALK_FACTOR = 500, 2_000, 20
 """How far the begin index is walked for a limited answer before the candidates are collected instead."""
 
 
 def find(compiled: CompiledCue, query: Query, *, pinned: bool, near: Window) -> Select[Any]:
     """The rows a query asks for, in order."""
-    ids = _walked(compiled, query, near) if _walks(query, pinned=pinned) else None
+    ids = _few(compiled, query, pinned=pinned, near=near)
     if ids is None:
         return _ordered(select(*columns(event)).where(*_conditions(compiled, query, event)), query, event)
     return _ordered(select(*columns(event)).join(ids, ids.c.id == event.c.id), query, event, after=False)
@@ -106,10 +106,10 @@ def find(compiled: CompiledCue, query: Query, *, pinned: bool, near: Window) -> 
 
 def find_ids(compiled: CompiledCue, query: Query, *, pinned: bool, near: Window) -> Select[Any]:
     """Their ids alone, in order."""
-    ids = _walked(compiled, query, near) if _walks(query, pinned=pinned) else None
+    ids = _few(compiled, query, pinned=pinned, near=near)
     if ids is None:
         return _ordered(select(event.c.id).where(*_conditions(compiled, query, event)), query, event)
-    return _ordered(select(ids.c.id), query, ids, after=False)
+    return _ordered(select(event.c.id).join(ids, ids.c.id == event.c.id), query, event, after=False)
 
 
 def shape(query: Query, *, pinned: bool, near: Window) -> tuple[Any, ...]:
@@ -133,10 +133,24 @@ def parameters(query: Query, *, near: Window) -> dict[str, Any]:
     return given
 
 
+def _few(compiled: CompiledCue, query: Query, *, pinned: bool, near: Window) -> Any:
+    """The ids of a limited answer where it pays to find them first; None where the plain statement does."""
+    if isinstance(query.order, Nearest) and query.limit is not None:
+        return _nearest(compiled, query)
+    return _walked(compiled, query, near) if _walks(query, pinned=pinned) else None
+
+
+def _nearest(compiled: CompiledCue, query: Query) -> Any:
+    """The nearest events, and all that are as far as the last: by distance alone, for so the index has them."""
+    distance, _ = _order(query, event)
+    found = select(event.c.id).where(*_conditions(compiled, query, event)).order_by(distance)
+    return found.fetch(bindparam("limit", type_=BigInteger), with_ties=True).subquery("nearest")
+
+
 def _walks(query: Query, *, pinned: bool) -> bool:
     if query.limit is None or pinned or query.limit >= WALK_MOST:
         return False
-    return query.order in (Order.BEGIN, Order.BEGIN_REVERSED)
+    return not isinstance(query.order, Nearest)
 
 
 def _walked(compiled: CompiledCue, query: Query, near: Window) -> Any:
@@ -148,9 +162,11 @@ def _walked(compiled: CompiledCue, query: Query, near: Window) -> Any:
     """
     limit = bindparam("limit", type_=BigInteger)
     bounds: list[Condition] = []
-    if near.begin is not None:
+    # Only where the walk goes along the begins do these bound it.
+    along_begin = query.order is not Order.ID
+    if along_begin and near.begin is not None:
         bounds.append(begin(event) >= bindparam("near_begin", type_=_TIME))
-    if near.end is not None:
+    if along_begin and near.end is not None:
         bounds.append(begin(event) <= bindparam("near_end", type_=_TIME))
     rows = select(event).where(*bounds, *_after(query, event)).order_by(*_order(query, event))
     walk = rows.limit(bindparam("walk", type_=Integer)).subquery("walk")
@@ -212,7 +228,9 @@ def _order(query: Query, e: FromClause) -> list[ColumnElement[Any]]:
 
 def _ordered(statement: Select[Any], query: Query, e: FromClause, *, after: bool = True) -> Select[Any]:
     ordered = statement.order_by(*_order(query, e))
-    return ordered.limit(bindparam("limit", type_=BigInteger)) if after and query.limit is not None else ordered
+    # What was walked is limited already; of the nearest there may be more, all as far as the last.
+    limited = query.limit is not None and (after or isinstance(query.order, Nearest))
+    return ordered.limit(bindparam("limit", type_=BigInteger)) if limited else ordered
 
 
 # Sums over what matches

@@ -324,8 +324,12 @@ def test_ids_that_no_event_can_have_are_unknown(store: Store, number: int) -> No
     assert is_clear(caught.value)
 
 
-def _listed(store: Store, query: Query) -> list[int]:
-    return list(store.ids(query))
+def _behind(store: Store, order: Order, number: int) -> list[int]:
+    return list(store.ids(Query(order=order, after=Cursor(begin=at(0), id=number))))
+
+
+def _first(store: Store, limit: int) -> list[int]:
+    return list(store.ids(Query(limit=limit)))
 
 
 @pytest.mark.parametrize("number", [0, -1, 2**31, 2**63 - 1, 2**63, 10**30])
@@ -335,10 +339,9 @@ def test_cursors_and_limits_of_any_size_are_answered_or_refused(store: Store, nu
     behind = [event.id] if number < event.id else []
 
     for order in (Order.BEGIN, Order.ID):
-        query = Query(order=order, after=Cursor(begin=at(0), id=number))
-        _right_or_refused(partial(_listed, store, query), behind)
+        _right_or_refused(partial(_behind, store, order, number), behind)
     if number >= 0:
-        _right_or_refused(partial(_listed, store, Query(limit=number)), [event.id][:number])
+        _right_or_refused(partial(_first, store, number), [event.id][:number])
 
 
 def test_numbers_at_their_ends_compare_exactly(store: Store) -> None:

@@ -16,14 +16,14 @@ FROM close) < %(limit)s::BIGINT AND (event.period <@ tstzrange(%(p0)s::TIMESTAMP
 FROM type_closure
 WHERE type_closure.ancestor_id = %(p2)s::INTEGER))
  SELECT a.id, nearest.id AS id_1
-FROM (SELECT ids.id AS id
-FROM (SELECT close.id AS id, close.period AS period
+FROM (SELECT event.id AS id
+FROM event JOIN (SELECT close.id AS id, close.period AS period
 FROM close
 WHERE (SELECT count(*) AS count_1
 FROM close) >= %(limit)s::BIGINT UNION ALL SELECT sorted.id AS id, sorted.period AS period
 FROM (SELECT candidates.id AS id, candidates.period AS period
 FROM candidates ORDER BY lower(candidates.period), candidates.id
- LIMIT %(limit)s::BIGINT) AS sorted) AS ids ORDER BY lower(ids.period), ids.id) AS anchor JOIN event AS a ON a.id = anchor.id LEFT OUTER JOIN LATERAL (SELECT n.id AS id
+ LIMIT %(limit)s::BIGINT) AS sorted) AS ids ON ids.id = event.id ORDER BY lower(event.period), event.id) AS anchor JOIN event AS a ON a.id = anchor.id LEFT OUTER JOIN LATERAL (SELECT n.id AS id
 FROM event AS n
 WHERE n.agent = %(n0)s::VARCHAR AND upper(n.period) < lower(a.period) AND lower(n.period) < lower(a.period) AND n.frame_id = a.frame_id AND ST_Intersects(n.region, a.region) ORDER BY lower(n.period) DESC, n.id DESC
  LIMIT 1) AS nearest ON true ORDER BY lower(a.period), a.id

@@ -15,11 +15,11 @@ WHERE (SELECT count(*) AS count_1
 FROM close) < %(limit)s::BIGINT AND (event.period <@ tstzrange(%(p0)s::TIMESTAMP WITH TIME ZONE, %(p1)s::TIMESTAMP WITH TIME ZONE, '[]')) AND event.type_id IN (SELECT type_closure.descendant_id
 FROM type_closure
 WHERE type_closure.ancestor_id = %(p2)s::INTEGER) AND (lower(event.period), event.id) > (%(after_begin)s::TIMESTAMP WITH TIME ZONE, %(after_id)s::BIGINT))
- SELECT ids.id
-FROM (SELECT close.id AS id, close.period AS period
+ SELECT event.id
+FROM event JOIN (SELECT close.id AS id, close.period AS period
 FROM close
 WHERE (SELECT count(*) AS count_1
 FROM close) >= %(limit)s::BIGINT UNION ALL SELECT sorted.id AS id, sorted.period AS period
 FROM (SELECT candidates.id AS id, candidates.period AS period
 FROM candidates ORDER BY lower(candidates.period), candidates.id
- LIMIT %(limit)s::BIGINT) AS sorted) AS ids ORDER BY lower(ids.period), ids.id
+ LIMIT %(limit)s::BIGINT) AS sorted) AS ids ON ids.id = event.id ORDER BY lower(event.period), event.id

@@ -14,11 +14,11 @@ WHERE (SELECT count(*) AS count_1
 FROM close) < %(limit)s::BIGINT AND (event.feature_names @> %(p0)s::TEXT[]) AND (EXISTS (SELECT 1
 FROM json_array_elements(event.features) AS anon_2(value)
 WHERE CASE WHEN ((anon_2.value ->> 0) = %(p1)s::VARCHAR AND json_typeof(anon_2.value -> 1) = 'number') THEN CAST(anon_2.value ->> 1 AS NUMERIC) < CAST(%(p2)s::VARCHAR AS NUMERIC) ELSE false END)))
- SELECT ids.id
-FROM (SELECT close.id AS id, close.period AS period
+ SELECT event.id
+FROM event JOIN (SELECT close.id AS id, close.period AS period
 FROM close
 WHERE (SELECT count(*) AS count_1
 FROM close) >= %(limit)s::BIGINT UNION ALL SELECT sorted.id AS id, sorted.period AS period
 FROM (SELECT candidates.id AS id, candidates.period AS period
 FROM candidates ORDER BY lower(candidates.period), candidates.id
- LIMIT %(limit)s::BIGINT) AS sorted) AS ids ORDER BY lower(ids.period), ids.id
+ LIMIT %(limit)s::BIGINT) AS sorted) AS ids ON ids.id = event.id ORDER BY lower(event.period), event.id

@@ -24,11 +24,11 @@ FROM part AS step JOIN seen ON step.whole_id = seen.id)
  SELECT 1
 FROM seen JOIN event AS other ON other.id = seen.id
 WHERE other.uid != ALL (%(p0)s::UUID[]))))
- SELECT ids.id
-FROM (SELECT close.id AS id, close.period AS period
+ SELECT event.id
+FROM event JOIN (SELECT close.id AS id, close.period AS period
 FROM close
 WHERE (SELECT count(*) AS count_1
 FROM close) >= %(limit)s::BIGINT UNION ALL SELECT sorted.id AS id, sorted.period AS period
 FROM (SELECT candidates.id AS id, candidates.period AS period
 FROM candidates ORDER BY lower(candidates.period), candidates.id
- LIMIT %(limit)s::BIGINT) AS sorted) AS ids ORDER BY lower(ids.period), ids.id
+ LIMIT %(limit)s::BIGINT) AS sorted) AS ids ON ids.id = event.id ORDER BY lower(event.period), event.id

@@ -10,11 +10,11 @@ candidates AS MATERIALIZED
 FROM event
 WHERE (SELECT count(*) AS count_1
 FROM close) < %(limit)s::BIGINT AND event.agent = %(p0)s::VARCHAR)
- SELECT ids.id
-FROM (SELECT close.id AS id, close.period AS period
+ SELECT event.id
+FROM event JOIN (SELECT close.id AS id, close.period AS period
 FROM close
 WHERE (SELECT count(*) AS count_1
 FROM close) >= %(limit)s::BIGINT UNION ALL SELECT sorted.id AS id, sorted.period AS period
 FROM (SELECT candidates.id AS id, candidates.period AS period
 FROM candidates ORDER BY lower(candidates.period), candidates.id
- LIMIT %(limit)s::BIGINT) AS sorted) AS ids ORDER BY lower(ids.period), ids.id
+ LIMIT %(limit)s::BIGINT) AS sorted) AS ids ON ids.id = event.id ORDER BY lower(event.period), event.id
