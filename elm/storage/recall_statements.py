@@ -135,7 +135,8 @@ def parameters(query: Query, *, near: Window) -> dict[str, Any]:
 
 def _few(compiled: CompiledCue, query: Query, *, pinned: bool, near: Window) -> Any:
     """The ids of a limited answer where it pays to find them first; None where the plain statement does."""
-    if isinstance(query.order, Nearest) and query.limit is not None:
+    # Of a cue that few match the index by distance would be walked to its end: then candidates are collected.
+    if isinstance(query.order, Nearest) and query.limit is not None and query.cue == And():
         return _nearest(compiled, query)
     return _walked(compiled, query, near) if _walks(query, pinned=pinned) else None
 

@@ -1,10 +1,8 @@
 SELECT event.id
-FROM event JOIN (SELECT event.id AS id
 FROM event
 WHERE (event.period <@ tstzrange(%(p0)s::TIMESTAMP WITH TIME ZONE, %(p1)s::TIMESTAMP WITH TIME ZONE, '[]')) AND event.type_id IN (SELECT type_closure.descendant_id
 FROM type_closure
 WHERE type_closure.ancestor_id = %(p2)s::INTEGER) AND event.frame_id = (SELECT frame.id
 FROM frame
-WHERE frame.name = %(to_frame)s::VARCHAR) ORDER BY event.region <-> ST_GeomFromWKB(%(to)s)
- FETCH FIRST (%(limit)s::BIGINT) ROWS WITH TIES) AS nearest ON nearest.id = event.id ORDER BY event.region <-> ST_GeomFromWKB(%(to)s), event.id
+WHERE frame.name = %(to_frame)s::VARCHAR) ORDER BY event.region <-> ST_GeomFromWKB(%(to)s), event.id
  LIMIT %(limit)s::BIGINT

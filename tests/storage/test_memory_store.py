@@ -496,7 +496,7 @@ def test_explain_says_what_each_condition_keeps(store: MemoryStore) -> None:
     assert [(row.alone, row.left) for row in explained.conditions] == [(2, 2), (2, 1)]
     assert explained.conditions[0].condition == '{"op":"agent","agent":"r"}'
     assert store.explain(Query()).conditions == ()
-    assert store.explain(Query(cue=cues.agent("r"), limit=1)).events == 1
+    assert store.explain(Query(cue=cues.agent("r"), limit=1)).events == 4
 
 
 def test_statistics(store: MemoryStore) -> None:
