@@ -1,7 +1,7 @@
 # `make demo` and `make test` do all set-up themselves: see scripts/setup.
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-slow lint bench clean
+.PHONY: help setup demo test test-slow lint opponents bench clean
 
 help:  ## show these targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -24,12 +24,17 @@ lint: setup  ## ruff and mypy --strict
 	@.venv/bin/ruff format --check
 	@.venv/bin/mypy
 
-bench: setup  ## measure inserts, recalls and type hierarchies; the figures go to out/
+opponents: setup  ## BoboCEP, with which recognition is compared, in an environment of its own
+	@test -x .opponents/bobocep/bin/python || .venv/bin/python -m venv .opponents/bobocep
+	@.opponents/bobocep/bin/python -m pip install -qq --disable-pip-version-check bobocep==1.2.2
+
+bench: setup  ## measure inserts, recalls, recognition and type hierarchies; the figures go to out/
 	@mkdir -p out
 	.venv/bin/python -m simulators insert --json out/insert.json
 	.venv/bin/python -m simulators recall --json out/recall.json
+	.venv/bin/python -m simulators recognize --json out/recognize.json
 	.venv/bin/python -m simulators types --json out/types.json
 
 clean:  ## remove what these targets made in the checkout
-	rm -rf .venv .mypy_cache .ruff_cache .pytest_cache .hypothesis build dist out
+	rm -rf .venv .opponents .mypy_cache .ruff_cache .pytest_cache .hypothesis build dist out
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

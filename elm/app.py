@@ -5,15 +5,30 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from datetime import datetime
 from types import TracebackType
-from typing import Self
+from typing import TYPE_CHECKING, Self, TypedDict, Unpack
 from uuid import UUID
 
 from elm.cues.algebra import Cue
 from elm.event import Event, StoredEvent
+from elm.log import Log, LoggedStore, LogKind, Tick
 from elm.recollector import OrderName, Recollection, Recollector
-from elm.store import Arrival, Closed, Committed, Cursor, Order, Statistics, Store, TypesAdded
+from elm.store import Arrival, Closed, Committed, Cursor, Order, Statistics, TypesAdded
+from elm.subscription import subscribe
 from elm.taxonomy import EventType
 from elm.writer import LOAD_BATCH, LoadReport, Writer
+
+if TYPE_CHECKING:
+    from elm.recognition import RecognitionManager, Replay, Timing
+    from elm.recognizers import Recognizer
+
+
+class RecognitionSettings(TypedDict, total=False):
+    """How a `RecognitionManager` works, where it differs from the usual."""
+
+    consumer: str
+    timing: Timing | None
+    since: int
+    batch: int
 
 
 class Memory:
@@ -22,7 +37,7 @@ class Memory:
     Use it as a context manager, or call `close()`.
     """
 
-    def __init__(self, store: Store) -> None:
+    def __init__(self, store: LoggedStore) -> None:
         self.store = store
         self.writer = Writer(store)
         self.recollector = Recollector(store)
@@ -81,6 +96,49 @@ class Memory:
     def get(self, name: UUID | int) -> StoredEvent:
         """The event with this uid or id."""
         return self.recollector.get(name)
+
+    @property
+    def log(self) -> Log:
+        """What was committed, in order, and the consumers that read it."""
+        return self.store.log
+
+    def subscribe(
+        self,
+        cue: Cue | None = None,
+        *,
+        since: int | None = None,
+        name: str | None = None,
+        timeout: float | None = None,
+    ) -> Iterator[StoredEvent]:
+        """The events that match a cue, as they are committed and closed; see `elm.subscription.subscribe`."""
+        return subscribe(self.store, cue, since=since, name=name, timeout=timeout)
+
+    def punctuate(self, until: datetime, agent: str | None = None) -> None:
+        """Promise that nothing of this agent (None: of no agent) that ended before `until` is to come."""
+        self.store.log.write([Tick(agent=agent, deadline=until, kind=LogKind.PUNCTUATION)])
+
+    def recognition(
+        self, recognizers: Iterable[Recognizer], **settings: Unpack[RecognitionSettings]
+    ) -> RecognitionManager:
+        """What finds complex events as the log grows, once it is started; see `RecognitionManager`."""
+        from elm.recognition import RecognitionManager
+
+        return RecognitionManager(self.store, tuple(recognizers), **settings)
+
+    def recognize(
+        self,
+        recognizers: Iterable[Recognizer],
+        *,
+        since: int = 0,
+        complete: bool = False,
+        timing: Timing | None = None,
+        commit: bool = True,
+    ) -> Replay:
+        """Find complex events in the log as it stands (the paper's R*); see `elm.recognition.replay`."""
+        from elm.recognition import replay
+
+        found = tuple(recognizers)
+        return replay(self.store, found, since=since, complete=complete, timing=timing, commit=commit)
 
     def statistics(self) -> Statistics:
         """What the memory holds, in numbers."""

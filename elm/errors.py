@@ -38,6 +38,28 @@ class MissingPackage(ElmError, ImportError):
     """An optional Python package is needed for this call. Install the extra that the message names."""
 
 
+# Reading the log
+
+
+class PositionLost(ElmError):
+    """A consumer of the log is not where this process took it to be: another process moves it. Read it again."""
+
+
+class UnknownConsumer(ElmError, LookupError):
+    """The log has no consumer of this name. Register it first, or correct the name."""
+
+
+class ConsumerBusy(ElmError):
+    """Another process works under this consumer's name. Stop that one, or choose another name."""
+
+
+# Recognition
+
+
+class DefinitionChanged(ElmError):
+    """A recognizer's definition is not the one that its version had in this memory. Raise its version."""
+
+
 # What the database is missing
 
 

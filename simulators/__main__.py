@@ -10,6 +10,7 @@ COMMANDS = MappingProxyType(
     {
         "insert": "time of one commit against a bare insert, and of a load against a bare COPY",
         "recall": "time of each class of cues against the best statement written by hand",
+        "recognize": "rates, latency and memory of recognition against BoboCEP, a load and a bare commit",
         "types": "time of loading a large type hierarchy against a bare COPY of its tables",
     }
 )
@@ -18,7 +19,7 @@ COMMANDS = MappingProxyType(
 
 def usage() -> str:
     """How the simulators are called."""
-    lines = [f"  {name:<8} {purpose}" for name, purpose in COMMANDS.items()]
+    lines = [f"  {name:<9} {purpose}" for name, purpose in COMMANDS.items()]
     return "\n".join(["usage: python -m simulators COMMAND [--json FILE] ...", "", "commands:", *lines])
 
 

@@ -11,7 +11,7 @@ from itertools import chain, count
 import pytest
 from hypothesis import HealthCheck, settings
 
-from elm.store import Store
+from elm.log import LoggedStore
 from tests.servers import MEMORY, Server, run_container, run_private_cluster
 
 settings.register_profile(
@@ -30,11 +30,11 @@ class StoreFactory:
 
     LAST_FEW = 4
 
-    def __init__(self, open_store: Callable[[], Store]) -> None:
+    def __init__(self, open_store: Callable[[], LoggedStore]) -> None:
         self._open_store = open_store
-        self._opened: deque[Store] = deque()
+        self._opened: deque[LoggedStore] = deque()
 
-    def __call__(self) -> Store:
+    def __call__(self) -> LoggedStore:
         self.close(keep=self.LAST_FEW - 1)
         self._opened.append(self._open_store())
         return self._opened[-1]
@@ -59,17 +59,17 @@ def container_server() -> Iterator[Server]:
         yield server
 
 
-def _in_process() -> Store:
+def _in_process() -> LoggedStore:
     from elm.storage.memory import MemoryStore
 
     return MemoryStore()
 
 
-def _in_database(dsn: str) -> Callable[[], Store]:
+def _in_database(dsn: str) -> Callable[[], LoggedStore]:
     """The first memory is the database's own; each further one is made beside it by its first write."""
     names = chain([MEMORY], (f"{MEMORY}_{number}" for number in count(2)))
 
-    def open_store() -> Store:
+    def open_store() -> LoggedStore:
         from elm.storage.postgres import PostgresStore
 
         return PostgresStore(dsn, next(names))
@@ -94,6 +94,6 @@ def store_factory(request: pytest.FixtureRequest) -> Iterator[StoreFactory]:
 
 
 @pytest.fixture
-def store(store_factory: StoreFactory) -> Store:
+def store(store_factory: StoreFactory) -> LoggedStore:
     """One empty memory."""
     return store_factory()

@@ -23,8 +23,9 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("elm.cues",),
     # The ports, and the services that know nothing else.
     ("elm.store",),
+    ("elm.log",),
     ("elm.writer", "elm.recollector", "elm.recognizers", "elm.monitors"),
-    ("elm.loading", "elm.exporting", "elm.recognition"),
+    ("elm.loading", "elm.exporting", "elm.recognition", "elm.subscription"),
     # The rooms that know SQL, and the wiring.
     ("elm.storage",),
     ("elm.app",),

@@ -35,7 +35,7 @@ _HELP = "The format of the answer. Default: a table on a terminal, JSON Lines el
 EventOutput = Annotated[EventFormat | None, typer.Option("--output", "-o", help=_HELP, show_default=False)]
 RecordOutput = Annotated[RecordFormat | None, typer.Option("--output", "-o", help=_HELP, show_default=False)]
 
-_Format = TypeVar("_Format", EventFormat, RecordFormat)
+_Format = TypeVar("_Format", bound=StrEnum)
 
 
 def chosen(given: _Format | None, table: _Format, jsonl: _Format) -> _Format:

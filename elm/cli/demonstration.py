@@ -17,7 +17,7 @@ def demo(
         Path | None, typer.Option("--picture", metavar="FILE", dir_okay=False, help="Also draw what happened.")
     ] = None,
     # Not ELM_MEMORY: the demo's events have no place in the memory somebody works with.
-    memory: Annotated[str, typer.Option("--memory", metavar="NAME", help="The memory to fill.")] = "demo",
+    memory: Annotated[str, typer.Option("--memory", metavar="NAME", help="The memory to fill.")] = "mower",
     dsn: Dsn = None,
 ) -> None:
     """Fill a memory from a real mower's recording, and ask it what a person would ask."""

@@ -13,6 +13,7 @@ from elm.cli.exporting import export
 from elm.cli.loading import load
 from elm.cli.maintenance import doctor, migrate
 from elm.cli.recalling import recall
+from elm.cli.recognizing import recognize
 from elm.cli.root_group import RootGroup
 from elm.cli.showing import show, tree
 from elm.cli.type_commands import types
@@ -33,6 +34,7 @@ for _panel, _commands in _PANELS.items():
     for _command in _commands:
         app.command(rich_help_panel=_panel)(_command)
 app.add_typer(types, name="types", rich_help_panel="Memory")
+app.add_typer(recognize, name="recognize", rich_help_panel="Memory")
 
 
 def _version(asked: bool) -> None:

@@ -36,6 +36,7 @@ _CHUNK = 1_000
 def show(
     *,
     events: Annotated[list[str], typer.Argument(metavar="ID|UID...", help="The events, by id or uid.")],
+    why: Annotated[bool, typer.Option("--why", help="Show what recognized them, and from what, instead.")] = False,
     output: EventOutput = None,
     where: MemoryOptions,
 ) -> None:
@@ -50,8 +51,13 @@ def show(
                 found.append(memory.get(name))
             except UnknownEvent as error:
                 say(f"elm: {error}")
+        parts = _parts_below(memory, found, 1) if why else {}
     form = event_format(output)
-    if form is EventFormat.TABLE:
+    if why:
+        from elm.cli.why import write_reasons
+
+        write_reasons(found, parts, form)
+    elif form is EventFormat.TABLE:
         _write_cards(found)
     elif found:
         write_events(found, form)
@@ -76,7 +82,7 @@ def tree(
     name = event_name(event)
     with where.open() as memory:
         root = memory.get(name)
-        below = _parts_below(memory, root, depth)
+        below = _parts_below(memory, [root], depth)
     if record_format(output) is RecordFormat.JSONL:
         write_events(sorted({root.uid: root, **below}.values(), key=lambda each: each.id), EventFormat.JSONL)
     else:
@@ -93,12 +99,12 @@ def _write_cards(events: Iterable[StoredEvent]) -> None:
         console.print(event_card(event))
 
 
-def _parts_below(memory: Memory, root: StoredEvent, depth: int | None) -> dict[UUID, StoredEvent]:
+def _parts_below(memory: Memory, roots: Iterable[StoredEvent], depth: int | None) -> dict[UUID, StoredEvent]:
     """The direct and indirect parts by uid, fetched level by level."""
     from elm import cues
 
     known: dict[UUID, StoredEvent] = {}
-    level, wanted = 0, [*root.parts]
+    level, wanted = 0, [*dict.fromkeys(uid for each in roots for uid in each.parts)]
     while wanted and (depth is None or level < depth):
         fetched: list[StoredEvent] = []
         for start in range(0, len(wanted), _CHUNK):

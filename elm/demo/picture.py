@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from elm.app import Memory
-from elm.demo.plaza import uid
+from elm.demo.questions import session_of
 from elm.demo.recording import RUNS
 from elm.demo.style import CONTACT, INK, MOTIONS, MUTED, PAPER, minutes
 from elm.demo.words import number
@@ -25,7 +25,7 @@ except ImportError as error:
 
 def draw(memory: Memory, path: Path) -> None:
     """Draw what `memory` holds of the mower's runs into the PNG file `path`."""
-    sessions = [memory.get(uid(run, "session", 1)) for run in sorted(RUNS)]
+    sessions = [session_of(memory, run) for run in sorted(RUNS)]
     figure = Figure(figsize=(16, 13.2), facecolor=PAPER)
     maps = figure.add_gridspec(1, len(sessions), left=0.045, right=0.965, top=0.9, bottom=0.395, wspace=0.17)
     lengths = [minutes(session.interval.begin, session) for session in sessions]

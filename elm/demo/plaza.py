@@ -1,15 +1,15 @@
-"""The mower's two runs as events: drives, turns, stands and beacon contacts, and the episodes they make up."""
+"""The mower's two runs as atomic events: drives, turns, stands and beacon contacts; episodes are recognized."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from datetime import datetime
 from uuid import NAMESPACE_URL, UUID, uuid5
 
 import numpy as np
 
-from elm.demo.episodes import laps, rows, session
 from elm.demo.motion import Kind, Motion, motions
 from elm.demo.recording import RUNS, Oddities, Recording, moment, read, surveyed
 from elm.event import Event, Payload
@@ -35,34 +35,30 @@ TYPES = (
     EventType(name="Perception"),
     EventType(name="BeaconContact", parents=("Perception",)),
     EventType(name="Episode"),
-    EventType(name="Row", parents=("Episode",)),
-    EventType(name="Lap", parents=("Episode",)),
-    EventType(name="Session", parents=("Episode",)),
 )
 
 _NAMESPACE = uuid5(NAMESPACE_URL, "urn:elm:demo:plaza")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Run:
-    """One run as events, parts before wholes, with what was odd in the files."""
+class PlazaRun:
+    """One run as events, with what was odd in the files."""
 
     name: str
     motions: tuple[Event, ...]
     contacts: tuple[Event, ...]
-    rows: tuple[Event, ...]
-    laps: tuple[Event, ...]
-    session: Event
     oddities: Oddities
 
     @property
     def events(self) -> Iterator[Event]:
-        """Every event: atomic ones in the order in which they ended, then the episodes, parts first."""
+        """Every event, in the order in which they ended."""
         atomic = [*self.motions, *self.contacts]
         yield from sorted(atomic, key=lambda event: (_interval(event).end, _interval(event).begin, event.uid))
-        yield from self.rows
-        yield from self.laps
-        yield self.session
+
+    @property
+    def end(self) -> datetime:
+        """When the last of them ended."""
+        return max(end for event in (*self.motions, *self.contacts) if (end := _interval(event).end) is not None)
 
 
 def uid(run: str, kind: str, ordinal: int) -> UUID:
@@ -70,7 +66,7 @@ def uid(run: str, kind: str, ordinal: int) -> UUID:
     return uuid5(_NAMESPACE, f"{run}/{kind}/{ordinal}")
 
 
-def load(name: str) -> Run:
+def load(name: str) -> PlazaRun:
     """The run `name` ("plaza1" or "plaza2") as events."""
     recording = read(name)
     beacons = beacon_places(name)
@@ -82,17 +78,7 @@ def load(name: str) -> Run:
         _contact(recording, beacons[beacon], readings, uid(name, "contact", ordinal))
         for ordinal, (beacon, readings) in enumerate(_merged(recording), start=1)
     )
-    driven = tuple(rows(moved, lambda ordinal: uid(name, "row", ordinal)))
-    rounds = tuple(laps(moved, driven, lambda ordinal: uid(name, "lap", ordinal)))
-    return Run(
-        name=name,
-        motions=moved,
-        contacts=heard,
-        rows=driven,
-        laps=rounds,
-        session=session(moved, heard, driven, rounds, name, uid(name, "session", 1)),
-        oddities=recording.oddities,
-    )
+    return PlazaRun(name=name, motions=moved, contacts=heard, oddities=recording.oddities)
 
 
 def beacon_places(name: str) -> dict[int, Region]:
@@ -100,7 +86,7 @@ def beacon_places(name: str) -> dict[int, Region]:
     return {number: Region.around(x, y, BEACON_RADIUS, frame=name) for number, (x, y) in surveyed(name).items()}
 
 
-def load_all() -> list[Run]:
+def load_all() -> list[PlazaRun]:
     """Both runs, in the order of their clocks."""
     return [load(name) for name in RUNS]
 

@@ -11,7 +11,8 @@ from statistics import median
 from elm import cues
 from elm.app import Memory
 from elm.cues.algebra import Cue
-from elm.demo.plaza import beacon_places, uid
+from elm.demo.mower_recognizers import NEAR_BEACON, VISIT
+from elm.demo.plaza import beacon_places
 from elm.demo.recording import RUNS
 from elm.demo.words import at, clock, doing, duration, lasted, listed, named, number, numbers, run_of
 from elm.event import StoredEvent
@@ -55,8 +56,10 @@ def _near(beacon: int, metres: float) -> Cue:
     return cues.any_of(*(cues.within(metres, place) for place in _beacon(beacon)))
 
 
-def _session(memory: Memory, run: str) -> StoredEvent:
-    return memory.get(uid(run, "session", 1))
+def session_of(memory: Memory, run: str) -> StoredEvent:
+    """The session of the run of this name."""
+    (session,) = memory.recall(cues.exactly("Session") & cues.feature("run", "=", run))
+    return session
 
 
 def _stands(memory: Memory) -> list[StoredEvent]:
@@ -68,6 +71,10 @@ def _contacts_at_stands(memory: Memory) -> Cue:
     return cues.exactly("BeaconContact") & overlaps
 
 
+def _contacts_of_plaza1(memory: Memory) -> Cue:
+    return cues.exactly("BeaconContact") & cues.wholes("intersects", [session_of(memory, "plaza1").uid])
+
+
 def _after_longest_stand(memory: Memory) -> Cue:
     return cues.is_a("Motion") & cues.time("met_by", max(_stands(memory), key=duration).interval)
 
@@ -77,15 +84,21 @@ def _laps_with_stands(memory: Memory) -> Cue:
     return cues.exactly("Lap") & cues.parts("intersects", stands, transitive=True)
 
 
+def _laps_with_visits(memory: Memory) -> Cue:
+    visits = memory.recall(cues.exactly("BeaconVisit"))
+    near = {part for visit in visits for part in visit.parts}
+    return cues.exactly("Lap") & cues.parts("intersects", near, transitive=True)
+
+
 def _minute_ten(memory: Memory) -> Cue:
-    begin = _session(memory, "plaza1").interval.begin + timedelta(minutes=9)
+    begin = session_of(memory, "plaza1").interval.begin + timedelta(minutes=9)
     return cues.is_a("Motion") & cues.time("intersects", begin, begin + timedelta(minutes=1))
 
 
 def _far_from_beacons(memory: Memory) -> Cue:
     near = cues.any_of(*(cues.within(28.0, place) for place in beacon_places("plaza1").values()))
     # Not near any beacon is also true of every event in another frame: the session keeps to this one.
-    return cues.is_a("Motion") & cues.time("subset", _session(memory, "plaza1").interval) & ~near
+    return cues.is_a("Motion") & cues.time("subset", session_of(memory, "plaza1").interval) & ~near
 
 
 def _out_of_touch(memory: Memory) -> Cue:
@@ -183,6 +196,13 @@ def _say_out_of_touch(memory: Memory, found: Recollection) -> list[str]:
     return [f"in {len(silent)} motions, {lasted(total)} together", *listed(silent)]
 
 
+def _say_per_place(memory: Memory, found: Recollection) -> list[str]:
+    return [
+        f"{group.key}: {lasted(group.duration)} in {group.count} times"
+        for group in found.groups(ByFeature(name="place"))
+    ]
+
+
 QUESTIONS = (
     Question(
         text="Which rows passed within 5 m of beacon 6?",
@@ -213,7 +233,9 @@ QUESTIONS = (
     ),
     Question(
         text="How long was it in touch with each beacon of plaza1?",
-        cue=lambda memory: cues.exactly("BeaconContact") & cues.wholes("intersects", [uid("plaza1", "session", 1)]),
+        cue=lambda memory: (
+            cues.exactly("BeaconContact") & cues.wholes("intersects", [session_of(memory, "plaza1").uid])
+        ),
         say=_say_per_beacon,
     ),
     Question(
@@ -262,6 +284,16 @@ QUESTIONS = (
         text="When did it move or stand without any beacon in touch?",
         cue=_out_of_touch,
         say=_say_out_of_touch,
+    ),
+    Question(
+        text=f"Which beacons did it come within {NEAR_BEACON:g} m of, how often and for how long in all?",
+        cue=lambda memory: cues.exactly("BeaconVisit") | cues.exactly("BeaconPassage"),
+        say=_say_per_place,
+    ),
+    Question(
+        text=f"Which laps led by a beacon slowly, so that it was visited for {VISIT.total_seconds():g} s or more?",
+        cue=_laps_with_visits,
+        say=_say_episodes,
     ),
 )
 """The tour's questions, in the order in which they are asked."""

@@ -41,6 +41,7 @@ TYPES = (
 )
 
 _NAMESPACE = uuid5(NAMESPACE_URL, "urn:elm:demo:spirit")
+_STAYS = uuid5(_NAMESPACE, "Stay")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -171,7 +172,7 @@ def _stay(row: _Row, step: float, begins: Mapping[int, datetime], ordinal: int) 
             "distance": step,
         },
         agent=AGENT,
-        uid=_uid("Stay", str(ordinal)),
+        uid=_stay_uid(ordinal),
     )
 
 
@@ -183,6 +184,11 @@ def _whole(kind: str, name: str, parts: Sequence[Event], features: Mapping[str, 
         parts=[part.uid for part in parts],
         uid=_uid(kind, name),
     )
+
+
+def _stay_uid(ordinal: int) -> UUID:
+    """Uids that grow along the path: of events at one time, recognizers are fed the one with the smaller uid first."""
+    return UUID(int=_STAYS.int >> 32 << 32 | ordinal)
 
 
 def _uid(kind: str, name: str) -> UUID:

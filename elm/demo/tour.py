@@ -11,10 +11,14 @@ from rich.markup import escape
 from rich.syntax import Syntax
 from rich.table import Table
 
+from elm import cues
 from elm.app import Memory
-from elm.demo.plaza import TYPES, Run, load_all
+from elm.demo.mower_recognizers import recognize
+from elm.demo.plaza import TYPES, PlazaRun, load_all
 from elm.demo.questions import QUESTIONS
 from elm.demo.recording import ANCHOR, CREDIT
+from elm.demo.words import listed, named
+from elm.recognizers.base import RECOGNIZER, VERSION
 
 EXPLAINED = QUESTIONS[0]
 """The question whose statement is shown."""
@@ -28,6 +32,9 @@ def run(memory: Memory, *, picture: Path | None, console: Console) -> None:
     runs = load_all()
     _introduce(runs, console)
     _fill(memory, runs, console)
+    _recognize(memory, runs, console)
+    _count(memory, console)
+    _show_recognized(memory, console)
     _ask(memory, console)
     _show_statement(memory, console)
     if picture is not None and draw is not None:
@@ -43,7 +50,7 @@ def _drawing() -> Callable[[Memory, Path], None]:
     return draw
 
 
-def _introduce(runs: list[Run], console: Console) -> None:
+def _introduce(runs: list[PlazaRun], console: Console) -> None:
     console.print("[bold]Half an hour in the life of a robot mower[/]")
     console.print(f"{CREDIT}.", soft_wrap=True)
     console.print(
@@ -55,7 +62,7 @@ def _introduce(runs: list[Run], console: Console) -> None:
         console.print(f"Odd in [bold]{one.name}[/]: {'; '.join(one.oddities.lines())}.", soft_wrap=True)
 
 
-def _fill(memory: Memory, runs: list[Run], console: Console) -> None:
+def _fill(memory: Memory, runs: list[PlazaRun], console: Console) -> None:
     memory.add_types(TYPES)
     start = perf_counter()
     report = memory.load(event for one in runs for event in one.events)
@@ -65,12 +72,45 @@ def _fill(memory: Memory, runs: list[Run], console: Console) -> None:
         f"\n[bold]Loaded[/] {report.new:,} events in {seconds:.2f} s ({report.read / seconds:,.0f} events/s){known}.",
         soft_wrap=True,
     )
+
+
+def _recognize(memory: Memory, runs: list[PlazaRun], console: Console) -> None:
+    start, before = perf_counter(), memory.statistics().events
+    found = recognize(memory, runs)
+    seconds, new = perf_counter() - start, memory.statistics().events - before
+    known = sum(each.found for each in found) - new
+    console.print(
+        f"[bold]Recognized[/] {new:,} episodes in {seconds:.2f} s, from these events alone"
+        f"{f', {known:,} were there already' if known else ''}.",
+        soft_wrap=True,
+    )
+    table = Table("recognizer", "version", "events fed", "episodes found", "types")
+    for each in found:
+        types = ", ".join(each.outputs)
+        table.add_row(each.name, f"{each.version}", f"{each.fed:,}", f"{each.found:,}", types)
+    console.print(table)
+
+
+def _count(memory: Memory, console: Console) -> None:
     table = Table("type", "events", "first begin", "last end", "together")
     for group in memory.recall().groups("type"):
         minutes = group.duration.total_seconds() / 60
         end = "" if group.last_end is None else f"{group.last_end:%H:%M:%S}"
         table.add_row(str(group.key), f"{group.count:,}", f"{group.first_begin:%H:%M:%S}", end, f"{minutes:.1f} min")
     console.print(table)
+
+
+def _show_recognized(memory: Memory, console: Console) -> None:
+    stands = [stand.uid for stand in memory.recall(cues.exactly("Stand"))]
+    episode = memory.recall(cues.exactly("Row") & cues.parts("intersects", stands)).first()
+    assert episode is not None  # noqa: S101 - the mower stood in the midst of a row
+    console.print(
+        f"\n[bold]What {escape(named(episode))} was recognized from[/], by {episode.value(RECOGNIZER)} of version "
+        f"{episode.value(VERSION)}, in the order in which it matched",
+        soft_wrap=True,
+    )
+    for line in listed(memory.get(part) for part in episode.parts):
+        console.print(f"    {escape(line)}", soft_wrap=True)
 
 
 def _ask(memory: Memory, console: Console) -> None:

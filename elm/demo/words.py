@@ -40,9 +40,11 @@ def run_of(event: StoredEvent) -> str:
 
 
 def named(event: StoredEvent) -> str:
-    """The event by what it is: "row 7 of plaza1", "contact with beacon 6 of plaza1"."""
+    """The event by what it is: "row 7 of plaza1", "visit of beacon 5 of plaza1"."""
     if event.type == "BeaconContact":
         return f"contact with beacon {event.value('beacon')} of {run_of(event)}"
+    if event.type in ("BeaconVisit", "BeaconPassage"):
+        return f"{event.type.removeprefix('Beacon').lower()} of {event.value('place')}"
     ordinal = event.value("number")
     kind = event.type.lower()
     return f"{kind if ordinal is None else f'{kind} {ordinal}'} of {run_of(event)}"

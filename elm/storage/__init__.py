@@ -6,7 +6,7 @@ import os
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from elm.store import Store
+    from elm.log import LoggedStore
 
 IN_PROCESS = "memory://"
 """The DSN of a store in this process."""
@@ -23,7 +23,7 @@ def resolve_dsn(dsn: str | None) -> str:
     return cluster.dsn()
 
 
-def open_store(dsn: str | None, memory: str) -> Store:
+def open_store(dsn: str | None, memory: str) -> LoggedStore:
     """The store that a DSN names; nothing is created before the first write."""
     chosen = resolve_dsn(dsn)
     if chosen == IN_PROCESS:

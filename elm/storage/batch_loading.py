@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
 from uuid import UUID
 
 import psycopg
 
 from elm.errors import ConflictingContent
-from elm.event import StoredEvent
 from elm.storage import encoding
 from elm.storage import write_statements as sql
 from elm.storage.batch import Batch, parts_to_come
 from elm.storage.connections import Connection
-from elm.storage.event_writing import refuse_other, why_refused
+from elm.storage.event_writing import Stored, refuse_other, why_refused
+from elm.storage.staging import copy, stage
 from elm.store import BatchReport, Refusal
-
-Stored = Callable[[Sequence[UUID]], Iterable[StoredEvent]]
-"""Gives the events of some uids, as the loading transaction sees them."""
 
 _ATTEMPTS = 10
 """How often a batch is begun anew because another process was committing one of its events."""
@@ -82,26 +78,17 @@ def _copy_atomic(connection: Connection, batch: Batch, indexes: list[int]) -> se
     if not indexes:
         return set()
     count = len(encoding.COLUMNS)
-    _copy(connection, sql.COPY_EVENTS, [encoding.copied(batch.rows[index], count) for index in indexes])
+    copy(connection, sql.COPY_EVENTS, [encoding.copied(batch.rows[index], count) for index in indexes])
     uids = [batch.arrivals[index].event.uid for index in indexes]
     connection.execute(sql.LOG_COPIED, {"uids": uids, "now": batch.now})
     return set(uids)
 
 
 def _insert_complex(connection: Connection, batch: Batch, indexes: list[int]) -> set[UUID]:
-    connection.execute(sql.CREATE_STAGING)
-    count = 2 + len(encoding.COLUMNS)
-    places = {index: (encoding.int4(index), encoding.int4(batch.heights[index])) for index in indexes}
-    rows = [encoding.copied((*places[index], *batch.rows[index]), count) for index in indexes]
-    _copy(connection, sql.COPY_STAGING, rows)
+    stage(connection, [(index, batch.heights[index], batch.rows[index]) for index in indexes])
     connection.execute(sql.LOCK_OPEN_PARTS)
     taken: set[UUID] = set()
     for level in sorted({batch.heights[index] for index in indexes}):
         found = connection.execute(sql.LOAD_LEVEL, {"level": level, "now": batch.now}, binary=True)
-        taken |= {UUID(bytes=uid) for (uid,) in found}
+        taken |= {UUID(bytes=uid) for _, uid, _ in found}
     return taken
-
-
-def _copy(connection: Connection, statement: str, rows: list[bytes]) -> None:
-    with connection.cursor().copy(statement) as copy:
-        copy.write(b"".join([encoding.COPY_BEGIN, *rows, encoding.COPY_END]))

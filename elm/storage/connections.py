@@ -207,7 +207,7 @@ class Connections:
     def writing(self) -> Iterator[Connection]:
         """The connection that writes, one caller at a time."""
         with self._write_lock:
-            self._check_open()
+            self.check_open()
             if self._writing is None or _is_lost(self._writing):
                 self._writing = self._open(WRITING)
                 # At a rollback the driver would deallocate its own prepared statements, and with them those of
@@ -219,7 +219,7 @@ class Connections:
     @contextmanager
     def recalling(self) -> Iterator[Connection]:
         """A connection to recall with, to one caller at a time; handed on when the caller is done."""
-        self._check_open()
+        self.check_open()
         with self._lock:
             connection = self._idle.pop() if self._idle else None
         if connection is None or _is_lost(connection):
@@ -235,7 +235,8 @@ class Connections:
                 with self._lock:
                     self._idle.append(connection)
 
-    def _check_open(self) -> None:
+    def check_open(self) -> None:
+        """Refuse to go on after `close`."""
         if self._closed:
             raise StoreClosed(f"memory {self._memory!r} was closed: open it again with elm.connect")
 

@@ -28,7 +28,7 @@ from elm.cues.algebra import (
     node,
 )
 from elm.storage.conditions.kin import kin
-from elm.storage.conditions.rule import UIDS, Bind, Condition, Names, Rule
+from elm.storage.conditions.rule import UIDS, Bind, Condition, Names, Rule, indexed
 from elm.storage.conditions.what import feature, feature_names, features
 from elm.storage.conditions.when import duration, time
 from elm.storage.conditions.where import region
@@ -42,6 +42,9 @@ class CompiledCue:
     key: tuple[Any, ...]
     values: dict[str, Any]
     condition: Callable[[FromClause], Condition]
+    search: Callable[[FromClause], Condition] | None
+    """What an index finds: all that match and, unless `is_search`, others; None where no index serves."""
+    is_search: bool
 
 
 def compile_cue(cue: Cue, names: Names, *, prefix: str = "p") -> CompiledCue:
@@ -49,11 +52,14 @@ def compile_cue(cue: Cue, names: Names, *, prefix: str = "p") -> CompiledCue:
     rule = _rule(cue, names)
     values = {f"{prefix}{index}": value for index, (value, _) in enumerate(rule.values)}
 
-    def condition(e: FromClause) -> Condition:
-        binds = [bindparam(f"{prefix}{index}", type_=kind) for index, (_, kind) in enumerate(rule.values)]
-        return rule.build(e, *binds)
+    def bound(build: Callable[..., Condition]) -> Callable[[FromClause], Condition]:
+        def condition(e: FromClause) -> Condition:
+            return build(e, *(bindparam(f"{prefix}{index}", type_=kind) for index, (_, kind) in enumerate(rule.values)))
 
-    return CompiledCue(rule.key, values, condition)
+        return condition
+
+    search = None if rule.search is None else bound(rule.search)
+    return CompiledCue(rule.key, values, bound(rule.build), search, rule.is_search)
 
 
 def _rule(cue: Cue, names: Names) -> Rule:
@@ -80,19 +86,19 @@ def _rule(cue: Cue, names: Names) -> Rule:
             return feature(condition)
         case PayloadCue(data=data):
             # The digest finds it in the index, the bytes decide.
-            return Rule(
+            return indexed(
                 ("payload",),
                 ((data, LargeBinary()),),
                 lambda e, p: and_(func.sha256(e.c.payload) == func.sha256(p), e.c.payload == p),
             )
         case AgentCue(agent=agent):
-            return Rule(("agent",), ((agent, Text()),), lambda e, p: e.c.agent == p)
+            return indexed(("agent",), ((agent, Text()),), lambda e, p: e.c.agent == p)
         case DurationCue() as condition:
             return duration(condition)
         case KinCue() as condition:
             return kin(condition)
         case UidCue(uids=uids):
-            return Rule(("uid",), ((list(uids), UIDS),), lambda e, p: e.c.uid == any_(p))
+            return indexed(("uid",), ((list(uids), UIDS),), lambda e, p: e.c.uid == any_(p))
         case unknown:
             assert_never(unknown)
 
@@ -101,14 +107,23 @@ def _combined(op: str, args: Sequence[Cue], names: Names) -> Rule:
     rules = [_rule(arg, names) for arg in args]
     values = tuple(value for rule in rules for value in rule.values)
 
-    def build(e: FromClause, *binds: Bind) -> Condition:
+    def joined(e: FromClause, binds: Sequence[Bind], builds: Sequence[Callable[..., Condition] | None]) -> Condition:
         rest = iter(binds)
-        built = [rule.build(e, *_take(rest, len(rule.values))) for rule in rules]
-        if op == "and":
-            return and_(true(), *built)
-        return or_(false(), *built)
+        taken = [_take(rest, len(rule.values)) for rule in rules]
+        built = [build(e, *own) for build, own in zip(builds, taken, strict=True) if build is not None]
+        return and_(true(), *built) if op == "and" else or_(false(), *built)
 
-    return Rule((op, *(rule.key for rule in rules)), values, build)
+    def build(e: FromClause, *binds: Bind) -> Condition:
+        return joined(e, binds, [rule.build for rule in rules])
+
+    def search(e: FromClause, *binds: Bind) -> Condition:
+        return joined(e, binds, [rule.search for rule in rules])
+
+    key = (op, *(rule.key for rule in rules))
+    if rules and all(rule.is_search for rule in rules):
+        return indexed(key, values, build)
+    served = [rule.search is not None for rule in rules]
+    return Rule(key, values, build, search if (any(served) if op == "and" else rules and all(served)) else None)
 
 
 def _take(binds: Iterator[Bind], count: int) -> list[Bind]:
@@ -119,10 +134,10 @@ def _type(cue: TypeCue, names: Names) -> Rule:
     number = (names.type_id(cue.type), Integer())
     match cue.relation:
         case TypeRelation.EXACTLY:
-            return Rule(("type", "exactly"), (number,), lambda e, p: e.c.type_id == p)
+            return indexed(("type", "exactly"), (number,), lambda e, p: e.c.type_id == p)
         case TypeRelation.IS_A:
             # IN (SELECT ...), not = ANY(ARRAY(SELECT ...)): the latter took 170 ms where this takes 2.
-            return Rule(
+            return indexed(
                 ("type", "is_a"),
                 (number,),
                 lambda e, p: e.c.type_id.in_(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from datetime import UTC, datetime
 from heapq import heapify, heappop, heappush
 from uuid import UUID
@@ -14,6 +14,9 @@ from elm.storage import write_statements as sql
 from elm.storage.connections import Connection, TransactionUndone
 from elm.storage.names import NameCache
 from elm.store import Arrival, Closed, Committed
+
+Stored = Callable[[Sequence[UUID]], Iterable[StoredEvent]]
+"""Gives the events of some uids, as the writing transaction sees them."""
 
 
 def encoded(arrivals: Sequence[Arrival], names: NameCache, now: datetime) -> list[encoding.Row]:
@@ -65,6 +68,15 @@ def wholes_last(arrivals: Sequence[Arrival]) -> list[Arrival]:
         for uid in level:
             del waiting[uid]
     return ordered
+
+
+def same_or_refused(event: Event, stored: Stored) -> Committed:
+    """An event that was not taken is the one already stored, as it stands now, or refused."""
+    known = {each.uid: each for each in stored([event.uid, *event.parts])}
+    if event.uid not in known:
+        raise why_refused(event, known.values())
+    refuse_other(event, known[event.uid])
+    return Committed(id=known[event.uid].id, uid=event.uid, new=False)
 
 
 def why_refused(event: Event, parts: Iterable[StoredEvent]) -> Exception:

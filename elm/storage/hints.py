@@ -1,8 +1,8 @@
-"""What a cue tells about its answer before it is asked: whether it can only be small, and when its events began."""
+"""What a cue tells about its answer before it is asked: whether its size is known, and when its events began."""
 
 from __future__ import annotations
 
-from elm.cues.algebra import And, Cue, KinCue, PayloadCue, SetRelation, TimeAxis, TimeCue, UidCue
+from elm.cues.algebra import And, Cue, DurationCue, KinCue, PayloadCue, SetRelation, TimeAxis, TimeCue, UidCue
 from elm.interval import AllenRelation, Window
 
 
@@ -17,6 +17,11 @@ def is_pinned(cue: Cue) -> bool:
             return bool(uids) and relation in (SetRelation.EQUAL, SetRelation.SUPERSET, SetRelation.INTERSECTS)
         case _:
             return False
+
+
+def is_guess(cue: Cue) -> bool:
+    """Whether the planner takes a third of what else matches for the answer, having nothing to tell it by."""
+    return any(map(is_guess, cue.args)) if isinstance(cue, And) else isinstance(cue, DurationCue)
 
 
 def begins_within(cue: Cue) -> Window:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from datetime import datetime
 from itertools import islice
-from threading import Lock
+from threading import Condition
 from typing import Any
 from uuid import UUID
 
@@ -18,8 +18,9 @@ from elm.event import StoredEvent, content_hash
 from elm.exchange import to_line
 from elm.interval import as_utc
 from elm.storage.memory_answers import grouped, nearest_first, neighbours
-from elm.storage.memory_changes import Changes, InboxRow
+from elm.storage.memory_changes import Changes
 from elm.storage.memory_index import EventIndex, View, conjuncts
+from elm.storage.memory_log import MemoryLog
 from elm.store import (
     Arrival,
     BatchReport,
@@ -48,29 +49,32 @@ class MemoryStore:
 
     def __init__(self, memory: str = "elm") -> None:
         self.memory = memory
-        self._lock = Lock()
+        self._changed = Condition()
         self._is_open = True
         self._taxonomy = Taxonomy()
         self._is_a_links: set[tuple[str, str]] = set()
         self._index = EventIndex()
         self._changes = Changes(self._index, self._taxonomy)
-
-    @property
-    def log_inbox(self) -> list[InboxRow]:
-        """What was committed and closed, in that order, for consumers of the log."""
-        return self._changes.log_inbox
+        self.log = MemoryLog(self._changes, self._index, self._locked, self._changed)
 
     @contextmanager
     def _locked(self) -> Iterator[None]:
-        with self._lock:
+        with self._changed:
             if not self._is_open:
                 raise StoreClosed(f"memory {self.memory!r} was closed: open it again with elm.connect")
             yield
 
+    @contextmanager
+    def _writing(self) -> Iterator[None]:
+        with self._locked():
+            yield
+            self._changed.notify_all()
+
     def close(self) -> None:
         """Refuse further calls; closing again changes nothing."""
-        with self._lock:
+        with self._changed:
             self._is_open = False
+            self._changed.notify_all()
 
     # Types
 
@@ -96,13 +100,13 @@ class MemoryStore:
     def commit_all(self, arrivals: Sequence[Arrival]) -> list[Committed]:
         """Keep all or none; events may be parts of each other in any order, and are numbered parts first."""
         contents = [content_hash(arrival.event) for arrival in arrivals]
-        with self._locked():
+        with self._writing():
             return self._changes.keep(arrivals, contents)
 
     def load(self, arrivals: Sequence[Arrival]) -> BatchReport:
         """Keep what can be kept of a batch whose parts come before their wholes or are in the memory."""
         contents = [content_hash(arrival.event) for arrival in arrivals]
-        with self._locked():
+        with self._writing():
             return self._changes.load(arrivals, contents)
 
     def finish_load(self) -> None:
@@ -113,7 +117,7 @@ class MemoryStore:
     def close_event(self, uid: UUID, end: datetime) -> Closed:
         """End an open event and recompute the extents of all its wholes; the same end again changes nothing."""
         end = as_utc(end, what="the end of an event")
-        with self._locked():
+        with self._writing():
             return self._changes.close(uid, end)
 
     # Reading

@@ -11,6 +11,7 @@ from elm.cues.algebra import Kin
 from elm.errors import ConflictingContent, ElmError, InvalidValue, UnknownEvent
 from elm.event import Event, StoredEvent, content_hash
 from elm.interval import Interval, as_utc
+from elm.log import LogKind, Tick
 from elm.storage.memory_events import as_stored, changed, parts_first, span
 from elm.storage.memory_index import EventIndex
 from elm.store import Arrival, BatchReport, Closed, Committed, Refusal
@@ -18,21 +19,21 @@ from elm.taxonomy import Taxonomy
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class InboxRow:
-    """One entry of the log, in the order of writing: an event came (`commit`), or ended (`close`)."""
+class LogRow:
+    """One entry of the log; its place in the list is its position."""
 
-    n: int
-    event_id: int
-    kind: str
-    agent: str | None
+    kind: LogKind
     at: datetime
+    agent: str | None
+    event_id: int | None = None
+    deadline: datetime | None = None
 
 
 class Changes:
     """Writes events to an index. Not locked: its store does that."""
 
     def __init__(self, index: EventIndex, taxonomy: Taxonomy) -> None:
-        self.log_inbox: list[InboxRow] = []
+        self.log: list[LogRow] = []
         self._index = index
         self._taxonomy = taxonomy
         self._contents: dict[UUID, bytes] = {}
@@ -55,7 +56,7 @@ class Changes:
             for part in stored.parts:
                 known = self._index[part]
                 self._index.replace(changed(known, wholes=(*known.wholes, stored.uid)))
-        self._log("commit", staged.values())
+        self._log((LogKind.OPEN if each.interval.is_open else LogKind.COMMIT, each) for each in staged.values())
         return [
             Committed(id=self._index.ids[uid], uid=uid, new=staged.pop(uid, None) is not None)
             for uid in (arrival.event.uid for arrival in arrivals)
@@ -133,7 +134,7 @@ class Changes:
         # Ids grow from parts to wholes: in their order each whole sees its parts as they are by now.
         above = sorted(self._index.ids[whole] for whole in self._index.kin(uid, Kin.WHOLES, transitive=True))
         closed = [whole for number in above if (whole := self._close_whole(number)) is not None]
-        self._log("close", [ended, *closed])
+        self._log((LogKind.CLOSE, each) for each in (ended, *closed))
         return Closed(new=True, wholes=tuple(whole.uid for whole in closed))
 
     def _close_whole(self, number: int) -> StoredEvent | None:
@@ -146,8 +147,11 @@ class Changes:
         self._index.replace(closed)
         return closed
 
-    def _log(self, kind: str, events: Iterable[StoredEvent]) -> None:
+    def tick(self, ticks: Iterable[Tick]) -> None:
+        """Note entries of clocks."""
         at = datetime.now(UTC)
-        for event in events:
-            row = InboxRow(n=len(self.log_inbox) + 1, event_id=event.id, kind=kind, agent=event.agent, at=at)
-            self.log_inbox.append(row)
+        self.log += [LogRow(kind=tick.kind, at=at, agent=tick.agent, deadline=tick.deadline) for tick in ticks]
+
+    def _log(self, news: Iterable[tuple[LogKind, StoredEvent]]) -> None:
+        at = datetime.now(UTC)
+        self.log += [LogRow(kind=kind, at=at, agent=event.agent, event_id=event.id) for kind, event in news]

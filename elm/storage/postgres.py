@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
 from itertools import islice
@@ -13,18 +12,20 @@ from uuid import UUID
 import psycopg
 from sqlalchemy import Select
 
-from elm.cues.algebra import Cue, UidCue
+from elm.cues.algebra import Cue
 from elm.cues.codec import cue_to_json
 from elm.event import StoredEvent
 from elm.exchange import to_line
 from elm.interval import Window
-from elm.storage import batch_loading, event_writing, grouping, hints, recall_statements, schema, type_writing
+from elm.storage import batch_loading, event_writing, grouping, hints, recall_statements, type_writing
 from elm.storage import write_statements as sql
 from elm.storage.batch import made_ready
-from elm.storage.connections import Connection, Connections, repeated
+from elm.storage.connections import Connection, repeated
 from elm.storage.cue_compiler import CompiledCue, compile_cue
-from elm.storage.names import NameCache
-from elm.storage.rows import FRAME_ID, SUBJECT_FRAME_ID, TYPE_ID, decoders, moment
+from elm.storage.postgres_log import PostgresLog
+from elm.storage.rows import moment
+from elm.storage.session import Session
+from elm.storage.writing_together import Together
 from elm.store import (
     MOST_ID,
     Arrival,
@@ -52,25 +53,24 @@ class PostgresStore:
     """The `Store` over one schema of a PostgreSQL database; safe to share between threads."""
 
     def __init__(self, dsn: str, memory: str) -> None:
-        self.memory = schema.check_memory_name(memory)
-        self._dsn = dsn
-        self._connections = Connections(dsn, memory)
-        self._names = NameCache(self._connections, memory)
-        self._decode = decoders(self._names.types, self._names.frames)
-        self._statements = recall_statements.StatementCache()
-        self._is_ready = False
+        self._session = Session(dsn, memory)
+        self.memory = memory
+        self.log = PostgresLog(self._session)
+        self._connections = self._session.connections
+        self._names = self._session.names
+        self._statements = self._session.statements
 
     # Types
 
     def add_types(self, types: Sequence[EventType]) -> TypesAdded:
         """Add types and parents, in any order; cycles and unknown parents refuse the whole call."""
-        self._ready_to_write()
+        self._session.ready_to_write()
         with self._connections.writing() as connection:
             return type_writing.add_types(connection, types)
 
     def types(self) -> Iterator[EventType]:
         """All types, parents first."""
-        self._ready_to_recall()
+        self._session.ready_to_recall()
         with self._connections.recalling() as connection:
             return type_writing.every_type(connection)
 
@@ -79,71 +79,57 @@ class PostgresStore:
     @repeated
     def commit(self, arrival: Arrival) -> Committed:
         """Keep one event whose parts are all in the memory."""
-        self._ready_to_write()
+        self._session.ready_to_write()
         now = datetime.now(UTC)
         (row,) = event_writing.encoded([arrival], self._names, now)
         with self._connections.writing() as connection:
             done = event_writing.commit(connection, arrival.event, row, now)
-        return done or self._same_or_refused(arrival)
+            if done is None:
+                return event_writing.same_or_refused(arrival.event, partial(self._session.stored, connection))
+            self.log.tell(connection)
+        return done
 
     @repeated
     def commit_all(self, arrivals: Sequence[Arrival]) -> list[Committed]:
         """Keep all or none; events may be parts of each other in any order."""
-        self._ready_to_write()
-        now = datetime.now(UTC)
-        ordered = event_writing.wholes_last(arrivals)
-        rows = event_writing.encoded(ordered, self._names, now)
-        done: dict[UUID, Committed] = {}
-        with self._connections.writing() as connection, connection.transaction():
-            for arrival, row in zip(ordered, rows, strict=True):
-                event = arrival.event
-                found = event_writing.commit(connection, event, row, now)
-                done[event.uid] = found or self._same_or_refused(arrival, connection)
-        answers = []
-        for arrival in arrivals:
-            answers.append(done[arrival.event.uid])
-            # The same event once more in one call was there already.
-            done[arrival.event.uid] = replace(answers[-1], new=False)
-        return answers
-
-    def _same_or_refused(self, arrival: Arrival, connection: Connection | None = None) -> Committed:
-        """An event that was not taken is the one already stored, as it stands now, or refused."""
-        event = arrival.event
-        if connection is None:
-            with self._connections.writing() as own:
-                return self._same_or_refused(arrival, own)
-        stored = {each.uid: each for each in self._stored(connection, [event.uid, *event.parts])}
-        if event.uid in stored:
-            event_writing.refuse_other(event, stored[event.uid])
-            return Committed(id=stored[event.uid].id, uid=event.uid, new=False)
-        raise event_writing.why_refused(event, stored.values())
+        self._session.ready_to_write()
+        together = Together(arrivals, self._names)
+        with self._connections.writing() as connection:
+            with connection.transaction():
+                done = together.commit(connection, partial(self._session.stored, connection))
+            self.log.tell(connection)
+        return done
 
     @repeated
     def load(self, arrivals: Sequence[Arrival]) -> BatchReport:
         """Keep what can be kept of a batch whose parts come before their wholes or are in the memory."""
-        self._ready_to_write()
+        self._session.ready_to_write()
         if not arrivals:
             return BatchReport(new=0, existing=0, refused=())
         batch = made_ready(arrivals, self._names)
         with self._connections.writing() as connection:
-            return batch_loading.load(connection, batch, partial(self._stored, connection))
+            report = batch_loading.load(connection, batch, partial(self._session.stored, connection))
+            self.log.tell(connection)
+        return report
 
     def finish_load(self) -> None:
         """Bring the planner's statistics up to date."""
-        self._ready_to_write()
+        self._session.ready_to_write()
         with self._connections.writing() as connection:
             connection.execute(sql.ANALYZE)
 
     @repeated
     def close_event(self, uid: UUID, end: datetime) -> Closed:
         """End an open event and recompute the extents of all its wholes; the same end again changes nothing."""
-        self._ready_to_write()
+        self._session.ready_to_write()
         with self._connections.writing() as connection:
             with connection.transaction():
                 closed = event_writing.close(connection, uid, end)
             if closed is not None:
+                self.log.tell(connection)
                 return closed
-            return event_writing.why_not_closed(uid, end, next(iter(self._stored(connection, [uid])), None))
+            stored = next(self._session.stored(connection, [uid]), None)
+            return event_writing.why_not_closed(uid, end, stored)
 
     # Recalling
 
@@ -174,7 +160,7 @@ class PostgresStore:
 
     def get(self, ids: Sequence[int]) -> list[StoredEvent]:
         """The events with these ids, in id order; unknown ids are left out."""
-        self._ready_to_recall()
+        self._session.ready_to_recall()
         text = self._statements.text("by id", recall_statements.by_ids)
         possible = [number for number in ids if 0 < number <= MOST_ID]
         return list(self._events(text, {"ids": possible}, at_once=True))
@@ -246,13 +232,13 @@ class PostgresStore:
         def batches() -> Iterator[Any]:
             with self._connections.recalling() as connection:
                 rows = self._stream(connection, text, values)
-                yield from arrow_rows.batches(rows, self._learn, self._names.types, self._names.frames)
+                yield from arrow_rows.batches(rows, self._session.learn, self._names.types, self._names.frames)
 
         return reader_of(batches())
 
     def statistics(self) -> Statistics:
         """What the memory holds, in numbers."""
-        self._ready_to_recall()
+        self._session.ready_to_recall()
         row = self._one(recall_statements.STATISTICS, {"memory": self.memory})
         times = [None if raw is None else moment(raw) for raw in row[7:10]]
         return Statistics(
@@ -283,41 +269,28 @@ class PostgresStore:
         return text, {**compiled.values, **recall_statements.parameters(query, near=near)}
 
     def _compiled(self, cue: Cue, *, prefix: str = "p") -> CompiledCue:
-        self._ready_to_recall()
+        self._session.ready_to_recall()
         return compile_cue(cue, self._names, prefix=prefix)
 
     def _events(self, text: str, values: dict[str, Any], *, at_once: bool) -> Iterator[StoredEvent]:
         with self._connections.recalling() as connection:
             if at_once:
                 rows = connection.execute(text, values, binary=True).fetchall()
-                self._learn(rows, connection)
+                self._session.learn(rows, connection)
             else:
                 yield from self._streamed_events(connection, text, values)
                 return
-        decode = self._decode
+        decode = self._session.decode
         for row in rows:
             yield StoredEvent.of_row(row, decode)
 
     def _streamed_events(self, connection: Connection, text: str, values: dict[str, Any]) -> Iterator[StoredEvent]:
         stream = self._stream(connection, text, values)
-        decode = self._decode
+        decode = self._session.decode
         while chunk := list(islice(stream, CHUNK)):
-            self._learn(chunk)
+            self._session.learn(chunk)
             for row in chunk:
                 yield StoredEvent.of_row(row, decode)
-
-    def _learn(self, rows: Sequence[Sequence[Any]], connection: Connection | None = None) -> None:
-        """Have the names at hand that these rows mention by number."""
-        types = {row[TYPE_ID] for row in rows} - self._names.types.keys()
-        frames = ({row[FRAME_ID] for row in rows} | {row[SUBJECT_FRAME_ID] for row in rows}) - {None}
-        if not types and frames <= self._names.frames.keys():
-            return
-        if connection is not None:
-            self._names.learn(connection, types, frames)
-            return
-        # The connection that streams is busy.
-        with self._connections.recalling() as other:
-            self._names.learn(other, types, frames)
 
     def _stream(self, connection: Connection, text: str, values: dict[str, Any]) -> Iterator[Sequence[Any]]:
         size = CHUNK if _CHUNKED else 1
@@ -329,40 +302,6 @@ class PostgresStore:
 
     def _one(self, text: str, values: dict[str, Any]) -> Any:
         return self._all(text, values)[0]
-
-    def _stored(self, connection: Connection, uids: Sequence[UUID]) -> Iterator[StoredEvent]:
-        """The events with these uids, as the given connection's transaction sees them."""
-        if not uids:
-            return
-        compiled = self._compiled(UidCue(uids=tuple(uids)))
-        query = Query(cue=UidCue(uids=tuple(uids)))
-        text = self._statements.text(
-            ("find", compiled.key, recall_statements.shape(query, pinned=True, near=Window())),
-            lambda: recall_statements.find(compiled, query, pinned=True, near=Window()),
-        )
-        rows = connection.execute(text, compiled.values, binary=True).fetchall()
-        self._learn(rows)
-        for row in rows:
-            yield StoredEvent.of_row(row, self._decode)
-
-    def _ready_to_recall(self) -> None:
-        if not self._is_ready:
-            with self._connections.recalling() as connection:
-                schema.require(connection, self.memory)
-            self._is_ready = True
-
-    def _ready_to_write(self) -> None:
-        if not self._is_ready:
-            with self._connections.writing() as connection:
-                revision = schema.revision_of(connection, self.memory)
-            if revision is None:
-                # Imported here: most commands never create a memory, and alembic takes its time to load.
-                from elm.storage.migrations import migrate
-
-                migrate(self._dsn, self.memory)
-            else:
-                schema.check_revision(revision, self.memory)
-            self._is_ready = True
 
 
 def _hints(query: Query) -> tuple[bool, Window]:

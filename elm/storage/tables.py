@@ -24,7 +24,7 @@ from sqlalchemy import (
 )
 from sqlalchemy.dialects.postgresql import JSON, TSTZRANGE
 
-REVISION = "0001"
+REVISION = "0002"
 """The migration that makes the tables as they stand here."""
 
 metadata = MetaData(
@@ -165,7 +165,51 @@ log_inbox = Table(
     Column("at", TIMESTAMP(timezone=True), nullable=False),
 )
 
+log_head = Table(
+    "log_head",
+    metadata,
+    # The one row has a number, so that an update can be replicated and moves no index entry.
+    Column("id", SmallInteger, primary_key=True, autoincrement=False),
+    Column("seq", BigInteger, nullable=False),
+    CheckConstraint("id = 1", name="one_row"),
+)
+
+log = Table(
+    "log",
+    metadata,
+    Column("seq", BigInteger, primary_key=True, autoincrement=False),
+    Column("event_id", BigInteger),
+    Column("kind", SmallInteger, nullable=False),
+    Column("agent", _c_text()),
+    Column("deadline", TIMESTAMP(timezone=True)),
+    Column("at", TIMESTAMP(timezone=True), nullable=False),
+)
+
+consumer = Table(
+    "consumer",
+    metadata,
+    Column("name", _c_text(), primary_key=True),
+    Column("position", BigInteger, nullable=False),
+    Column("checkpoint", BigInteger, nullable=False),
+    Column("state", LargeBinary),
+    Column("report", JSON, nullable=False),
+    Column("updated_at", TIMESTAMP(timezone=True), nullable=False),
+)
+
+definition = Table(
+    "definition",
+    metadata,
+    Column("name", _c_text(), primary_key=True),
+    Column("fingerprint", _c_text(), nullable=False),
+)
+
 LOG_COMMIT = 1
-"""`log_inbox.kind` of an event that was committed."""
+"""`kind`, in the log and its inbox, of an event that had ended when it was committed."""
 LOG_CLOSE = 2
-"""`log_inbox.kind` of an open event that was closed, or of a whole that thereby closed."""
+"""`kind` of an open event that was closed, or of a whole that thereby closed."""
+LOG_OPEN = 3
+"""`kind` of an event that was still going on when it was committed."""
+LOG_TICK = 4
+"""`kind` of a tick: time went by, at most to `deadline`."""
+LOG_PUNCTUATION = 5
+"""`kind` of a promise that nothing that ended before `deadline` is to come."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from elm.storage.encoding import COLUMNS
-from elm.storage.tables import LOG_CLOSE, LOG_COMMIT
+from elm.storage.tables import LOG_CLOSE, LOG_COMMIT, LOG_OPEN
 
 # What derives from the parts (Defs 7 and 10). The corners are collected, not the areas united: a union
 # would change the hull's last digits. In uid order, so that every store finds the same ones.
@@ -28,6 +28,10 @@ _AGREES = """
 """
 
 
+# The log says whether an event was open when it came: read again after it closed, it must tell the same.
+_KIND = f"CASE WHEN is_open THEN {LOG_OPEN} ELSE {LOG_COMMIT} END"
+
+
 def _filled(statement: str) -> str:
     """`statement` with the pieces that several share put in: all of them constants of this module."""
     return (
@@ -35,7 +39,7 @@ def _filled(statement: str) -> str:
         .replace("<extent>", _EXTENT)
         .replace("<agrees g.>", _AGREES.replace("<given>", "g."))
         .replace("<agrees s.>", _AGREES.replace("<given>", "s."))
-        .replace("<commit>", str(LOG_COMMIT))
+        .replace("<kind>", _KIND)
         .replace("<close>", str(LOG_CLOSE))
     )
 
@@ -49,9 +53,9 @@ WITH new AS (
     INSERT INTO event (<columns>)
     VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, $13, $14, $15, $16, $17)
     ON CONFLICT (uid) DO UPDATE SET uid = excluded.uid WHERE event.content = excluded.content
-    RETURNING id, xmax <> 0 AS existed
+    RETURNING id, upper_inf(period) AS is_open, xmax <> 0 AS existed
 ), logged AS (
-    INSERT INTO log_inbox (event_id, kind, agent, at) SELECT id, <commit>, $11, $18 FROM new WHERE NOT existed
+    INSERT INTO log_inbox (event_id, kind, agent, at) SELECT id, <kind>, $11, $18 FROM new WHERE NOT existed
 )
 SELECT id, existed FROM new
 """)
@@ -75,20 +79,20 @@ WITH g AS (
     FROM x, g
     WHERE x.found = cardinality($14) AND <agrees g.>
     ON CONFLICT (uid) DO UPDATE SET uid = excluded.uid WHERE event.content = excluded.content
-    RETURNING id, uid, agent, xmax <> 0 AS existed
+    RETURNING id, uid, agent, upper_inf(period) AS is_open, xmax <> 0 AS existed
 ), linked AS (
     INSERT INTO part (whole_id, part_id, ordinal, whole_uid)
     SELECT new.id, p.id, asked.ordinal, new.uid
     FROM new, unnest($14) WITH ORDINALITY AS asked (uid, ordinal) JOIN p USING (uid)
     WHERE NOT existed
 ), logged AS (
-    INSERT INTO log_inbox (event_id, kind, agent, at) SELECT id, <commit>, agent, $18 FROM new WHERE NOT existed
+    INSERT INTO log_inbox (event_id, kind, agent, at) SELECT id, <kind>, agent, $18 FROM new WHERE NOT existed
 )
 SELECT id, existed FROM new
 """)
 
-# Loading: atomic events are copied into the table; complex ones into a temporary table, and go from there
-# level by level, for a statement does not see the rows it inserts itself.
+# Many events: copied into a temporary table, they go from there level by level, for a statement does not see the
+# rows it inserts itself. Of a load, the atomic ones are copied into the table itself.
 
 CONTENTS = "SELECT uid, content FROM event WHERE uid = ANY(%s)"
 
@@ -96,7 +100,9 @@ COPY_EVENTS = _filled("COPY event (<columns>) FROM STDIN (FORMAT BINARY)")
 
 LOG_COPIED = _filled("""
 INSERT INTO log_inbox (event_id, kind, agent, at)
-SELECT id, <commit>, agent, %(now)s FROM event WHERE uid = ANY(%(uids)s) ORDER BY id
+SELECT id, <kind>, agent, %(now)s
+FROM (SELECT id, agent, upper_inf(period) AS is_open FROM event WHERE uid = ANY(%(uids)s)) copied
+ORDER BY id
 """)
 
 CREATE_STAGING = """
@@ -110,13 +116,26 @@ CREATE TEMPORARY TABLE IF NOT EXISTS staging (
 
 COPY_STAGING = "COPY staging FROM STDIN (FORMAT BINARY)"
 
+# What `COMMIT_ATOMIC` does, for all staged events without parts.
+COMMIT_STAGED = _filled("""
+WITH new AS (
+    INSERT INTO event (<columns>) SELECT <columns> FROM staging WHERE level = 0 ORDER BY row
+    ON CONFLICT (uid) DO UPDATE SET uid = excluded.uid WHERE event.content = excluded.content
+    RETURNING id, uid, agent, upper_inf(period) AS is_open, xmax <> 0 AS existed
+), logged AS (
+    INSERT INTO log_inbox (event_id, kind, agent, at)
+    SELECT id, <kind>, agent, %(now)s FROM new WHERE NOT existed ORDER BY id
+)
+SELECT id, uid, existed FROM new
+""")
+
 LOCK_OPEN_PARTS = """
 SELECT id FROM event
 WHERE uid IN (SELECT unnest(parts) FROM staging WHERE level > 0) AND upper_inf(period)
 ORDER BY id FOR SHARE
 """
 
-LOAD_LEVEL = _filled("""
+_LEVEL = _filled("""
 WITH p AS MATERIALIZED (
     SELECT s.row, asked.ordinal, e.id, e.uid, e.period, e.frame_id, e.region, e.subject_frame_id, e.subject, e.agent
     FROM staging s, unnest(s.parts) WITH ORDINALITY AS asked (uid, ordinal) JOIN event e ON e.uid = asked.uid
@@ -131,17 +150,27 @@ WITH p AS MATERIALIZED (
     FROM staging s JOIN x ON x.row = s.row
     WHERE s.level = %(level)s AND x.found = cardinality(s.parts) AND <agrees s.>
     ORDER BY s.row
-    RETURNING id, uid, agent
+    <conflict>
+    RETURNING id, uid, agent, upper_inf(period) AS is_open, xmax <> 0 AS existed
 ), linked AS (
     INSERT INTO part (whole_id, part_id, ordinal, whole_uid)
     SELECT new.id, p.id, p.ordinal, new.uid
     FROM new JOIN staging s ON s.uid = new.uid JOIN p ON p.row = s.row
+    WHERE NOT existed
 ), logged AS (
     INSERT INTO log_inbox (event_id, kind, agent, at)
-    SELECT id, <commit>, agent, %(now)s FROM new ORDER BY id
+    SELECT id, <kind>, agent, %(now)s FROM new WHERE NOT existed ORDER BY id
 )
-SELECT uid FROM new
+SELECT id, uid, existed FROM new
 """)
+
+# A load knows which uids are taken, and begins anew when others take one meanwhile.
+LOAD_LEVEL = _LEVEL.replace("<conflict>", "")
+# What `COMMIT_COMPLEX` does, for one level of staged events.
+COMMIT_LEVEL = _LEVEL.replace(
+    "<conflict>",
+    "ON CONFLICT (uid) DO UPDATE SET uid = excluded.uid WHERE event.content = excluded.content",
+)
 
 ANALYZE = "ANALYZE event, part, event_type, type_closure"
 

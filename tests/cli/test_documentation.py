@@ -95,7 +95,8 @@ def _sections() -> dict[str, str]:
 @pytest.mark.parametrize("name", COMMANDS)
 def test_a_section_shows_each_command_with_its_options(name: str) -> None:
     sections = _sections()
-    shared = sections["What all commands have in common"] + sections["What to recall by"]
+    common = ("What all commands have in common", "What to recall by", "Which recognizers")
+    shared = "".join(sections[title] for title in common)
     assert f"$ {name}" in sections[name], f"{name} has no example"
     missing = {option for option in _options(COMMANDS[name]) if option not in sections[name] + shared}
     assert not missing, f"{name} has options that its section does not mention"

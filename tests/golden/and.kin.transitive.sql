@@ -15,12 +15,16 @@ FROM part
 WHERE part.whole_id = event.id UNION SELECT step.part_id AS part_id
 FROM part AS step JOIN seen ON step.whole_id = seen.id)
  SELECT 1
-FROM seen JOIN event AS other ON other.id = seen.id
-WHERE other.uid != ALL (%(p0)s::UUID[]))) AND (NOT (EXISTS (WITH RECURSIVE seen(id) AS
+FROM seen
+WHERE seen.id != ALL (array((SELECT other.id
+FROM event AS other
+WHERE other.uid = ANY (%(p0)s::UUID[])))))) AND (NOT (EXISTS (WITH RECURSIVE seen(id) AS
 (SELECT part.whole_id AS id
 FROM part
 WHERE part.part_id = event.id UNION SELECT step.whole_id AS whole_id
 FROM part AS step JOIN seen ON step.part_id = seen.id)
  SELECT 1
-FROM seen JOIN event AS other ON other.id = seen.id
-WHERE other.uid != ALL (%(p1)s::UUID[])))) IS NOT true ORDER BY lower(event.period), event.id
+FROM seen
+WHERE seen.id != ALL (array((SELECT other.id
+FROM event AS other
+WHERE other.uid = ANY (%(p1)s::UUID[]))))))) IS NOT true ORDER BY lower(event.period), event.id

@@ -1,27 +1,53 @@
-WITH close AS MATERIALIZED
-(SELECT walk.id AS id, walk.period AS period
-FROM (SELECT event.id AS id, event.uid AS uid, event.type_id AS type_id, event.period AS period, event.frame_id AS frame_id, event.region AS region, event.subject_frame_id AS subject_frame_id, event.subject AS subject, event.feature_tokens AS feature_tokens, event.feature_names AS feature_names, event.features AS features, event.agent AS agent, event.media_type AS media_type, event.payload AS payload, event.parts AS parts, event.recorded_at AS recorded_at, event.content AS content, event.feature_ends AS feature_ends
+WITH glance AS MATERIALIZED
+(SELECT near.row AS row, near.begin AS begin, near.id AS id
+FROM (SELECT event.id AS id, event.uid AS uid, event.type_id AS type_id, event.period AS period, event.frame_id AS frame_id, event.region AS region, event.subject_frame_id AS subject_frame_id, event.subject AS subject, event.feature_tokens AS feature_tokens, event.feature_names AS feature_names, event.features AS features, event.agent AS agent, event.media_type AS media_type, event.payload AS payload, event.parts AS parts, event.recorded_at AS recorded_at, event.content AS content, event.feature_ends AS feature_ends, event.ctid AS row, lower(event.period) AS begin
 FROM event
 WHERE lower(event.period) >= %(near_begin)s::TIMESTAMP WITH TIME ZONE AND lower(event.period) <= %(near_end)s::TIMESTAMP WITH TIME ZONE ORDER BY lower(event.period) DESC, event.id DESC
- LIMIT %(walk)s::INTEGER) AS walk
-WHERE (walk.period <@ tstzrange(%(p0)s::TIMESTAMP WITH TIME ZONE, %(p1)s::TIMESTAMP WITH TIME ZONE, '[]')) AND walk.type_id IN (SELECT type_closure.descendant_id
+ LIMIT %(glance)s::INTEGER) AS near
+WHERE (near.period <@ tstzrange(%(p0)s::TIMESTAMP WITH TIME ZONE, %(p1)s::TIMESTAMP WITH TIME ZONE, '[]')) AND near.type_id IN (SELECT type_closure.descendant_id
 FROM type_closure
-WHERE type_closure.ancestor_id = %(p2)s::INTEGER) ORDER BY lower(walk.period) DESC, walk.id DESC
+WHERE type_closure.ancestor_id = %(p2)s::INTEGER) ORDER BY near.begin DESC, near.id DESC
  LIMIT %(limit)s::BIGINT),
-candidates AS MATERIALIZED
-(SELECT event.id AS id, event.period AS period
+handful AS MATERIALIZED
+(SELECT event.id AS id, event.ctid AS row, lower(event.period) AS begin
 FROM event
 WHERE (SELECT count(*) AS count_1
-FROM close) < %(limit)s::BIGINT AND (event.period <@ tstzrange(%(p0)s::TIMESTAMP WITH TIME ZONE, %(p1)s::TIMESTAMP WITH TIME ZONE, '[]')) AND event.type_id IN (SELECT type_closure.descendant_id
+FROM glance) < %(limit)s::BIGINT AND (event.period <@ tstzrange(%(p0)s::TIMESTAMP WITH TIME ZONE, %(p1)s::TIMESTAMP WITH TIME ZONE, '[]')) AND event.type_id IN (SELECT type_closure.descendant_id
 FROM type_closure
-WHERE type_closure.ancestor_id = %(p2)s::INTEGER))
- SELECT event.id, event.uid, event.type_id, event.period, event.frame_id, event.region AS region, event.subject_frame_id, event.subject AS subject, event.features, event.agent, event.media_type, event.payload, event.parts, array((SELECT up.whole_uid
+WHERE type_closure.ancestor_id = %(p2)s::INTEGER)
+ LIMIT %(handful)s::BIGINT + 1),
+walk AS MATERIALIZED
+(SELECT near.row AS row, near.begin AS begin, near.id AS id
+FROM (SELECT event.id AS id, event.uid AS uid, event.type_id AS type_id, event.period AS period, event.frame_id AS frame_id, event.region AS region, event.subject_frame_id AS subject_frame_id, event.subject AS subject, event.feature_tokens AS feature_tokens, event.feature_names AS feature_names, event.features AS features, event.agent AS agent, event.media_type AS media_type, event.payload AS payload, event.parts AS parts, event.recorded_at AS recorded_at, event.content AS content, event.feature_ends AS feature_ends, event.ctid AS row, lower(event.period) AS begin
+FROM event
+WHERE lower(event.period) >= %(near_begin)s::TIMESTAMP WITH TIME ZONE AND lower(event.period) <= %(near_end)s::TIMESTAMP WITH TIME ZONE ORDER BY lower(event.period) DESC, event.id DESC
+ LIMIT %(walk)s::INTEGER) AS near
+WHERE (SELECT count(*) AS count_2
+FROM handful) > %(handful)s::BIGINT AND (near.period <@ tstzrange(%(p0)s::TIMESTAMP WITH TIME ZONE, %(p1)s::TIMESTAMP WITH TIME ZONE, '[]')) AND near.type_id IN (SELECT type_closure.descendant_id
+FROM type_closure
+WHERE type_closure.ancestor_id = %(p2)s::INTEGER) ORDER BY near.begin DESC, near.id DESC
+ LIMIT %(limit)s::BIGINT)
+ SELECT there.id, there.uid, there.type_id, there.period, there.frame_id, there.region AS region, there.subject_frame_id, there.subject AS subject, there.features, there.agent, there.media_type, there.payload, there.parts, array((SELECT up.whole_uid
 FROM part AS up
-WHERE up.part_id = event.id ORDER BY up.whole_id)) AS wholes, event.recorded_at
-FROM event JOIN (SELECT close.id AS id, close.period AS period
-FROM close
+WHERE up.part_id = there.id ORDER BY up.whole_id)) AS wholes, there.recorded_at
+FROM (SELECT found.row AS row, found.begin AS begin, found.id AS id
+FROM (SELECT glance.row AS row, glance.begin AS begin, glance.id AS id
+FROM glance
 WHERE (SELECT count(*) AS count_1
-FROM close) >= %(limit)s::BIGINT UNION ALL SELECT sorted.id AS id, sorted.period AS period
-FROM (SELECT candidates.id AS id, candidates.period AS period
-FROM candidates ORDER BY lower(candidates.period) DESC, candidates.id DESC
- LIMIT %(limit)s::BIGINT) AS sorted) AS ids ON ids.id = event.id ORDER BY lower(event.period) DESC, event.id DESC
+FROM glance) >= %(limit)s::BIGINT UNION ALL SELECT handful.row AS row, handful.begin AS begin, handful.id AS id
+FROM handful
+WHERE (SELECT count(*) AS count_2
+FROM handful) <= %(handful)s::BIGINT UNION ALL SELECT walk.row AS row, walk.begin AS begin, walk.id AS id
+FROM walk
+WHERE (SELECT count(*) AS count_3
+FROM walk) >= %(limit)s::BIGINT UNION ALL SELECT event.ctid AS row, lower(event.period) AS begin, event.id AS id
+FROM event
+WHERE (SELECT count(*) AS count_2
+FROM handful) > %(handful)s::BIGINT AND (SELECT count(*) AS count_3
+FROM walk) < %(limit)s::BIGINT AND (event.period <@ tstzrange(%(p0)s::TIMESTAMP WITH TIME ZONE, %(p1)s::TIMESTAMP WITH TIME ZONE, '[]')) AND event.type_id IN (SELECT type_closure.descendant_id
+FROM type_closure
+WHERE type_closure.ancestor_id = %(p2)s::INTEGER)) AS found ORDER BY found.begin DESC, found.id DESC
+ LIMIT %(limit)s::BIGINT) AS ids JOIN LATERAL (SELECT event.id AS id, event.uid AS uid, event.type_id AS type_id, event.period AS period, event.frame_id AS frame_id, event.region AS region, event.subject_frame_id AS subject_frame_id, event.subject AS subject, event.feature_tokens AS feature_tokens, event.feature_names AS feature_names, event.features AS features, event.agent AS agent, event.media_type AS media_type, event.payload AS payload, event.parts AS parts, event.recorded_at AS recorded_at, event.content AS content, event.feature_ends AS feature_ends
+FROM event
+WHERE event.ctid = ids.row
+ LIMIT ALL OFFSET 0) AS there ON true ORDER BY ids.begin DESC, ids.id DESC

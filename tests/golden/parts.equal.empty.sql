@@ -1,3 +1,3 @@
 SELECT event.id
 FROM event
-WHERE event.parts <@ %(p0)s::UUID[] ORDER BY lower(event.period), event.id
+WHERE event.parts = %(p0)s::UUID[] ORDER BY lower(event.period), event.id

@@ -1,5 +1,5 @@
 SELECT event.id
 FROM event
 WHERE NOT (EXISTS (SELECT 1
-FROM part AS link JOIN event AS other ON other.id = link.whole_id
-WHERE link.part_id = event.id AND other.uid != ALL (%(p0)s::UUID[]))) ORDER BY lower(event.period), event.id
+FROM part AS link
+WHERE link.part_id = event.id AND link.whole_uid != ALL (%(p0)s::UUID[]))) ORDER BY lower(event.period), event.id

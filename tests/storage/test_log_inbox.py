@@ -16,7 +16,7 @@ import pytest
 from elm.errors import ElmError
 from elm.event import Event
 from elm.storage.postgres import PostgresStore
-from elm.storage.tables import LOG_CLOSE, LOG_COMMIT
+from elm.storage.tables import LOG_CLOSE, LOG_COMMIT, LOG_OPEN
 from elm.store import Arrival
 from elm.taxonomy import EventType
 from tests.clock import at, span
@@ -76,7 +76,12 @@ def thing(*parts: Event, agent: str | None = None, end: float | None = 1) -> Eve
 
 
 def committed(*events: Event) -> list[Entry]:
-    return [Entry(uid=event.uid, kind=LOG_COMMIT, agent=event.agent) for event in events]
+    """The entries of events that had ended, or that are atomic and still go on."""
+    return [Entry(uid=event.uid, kind=_kind(event), agent=event.agent) for event in events]
+
+
+def _kind(event: Event) -> int:
+    return LOG_OPEN if event.interval is not None and event.interval.is_open else LOG_COMMIT
 
 
 Write = Callable[[PostgresStore, Sequence[Event]], object]
@@ -118,6 +123,29 @@ def test_entry_has_the_agent_that_derives(inbox: Inbox, write: Write) -> None:
     over = thing(*parts)
     write(inbox.store, [*parts, over])
     assert inbox.entries()[-1] == Entry(uid=over.uid, kind=LOG_COMMIT, agent="armar6")
+
+
+def test_entry_says_whether_the_event_was_open_when_it_came(inbox: Inbox, write: Write) -> None:
+    """Of a complex event that derives; what it has become since makes no difference."""
+    ended, going_on = thing(), thing(end=None)
+    over, above, closed = thing(ended, going_on), thing(), thing(ended)
+    top = thing(over, closed)
+    events = [ended, going_on, over, above, closed, top]
+    write(inbox.store, events)
+    inbox.store.close_event(going_on.uid, at(5))
+    kinds = {(each.uid, each.kind) for each in inbox.entries()}
+    opened = {going_on.uid, over.uid, top.uid}
+    assert kinds == {(event.uid, LOG_OPEN if event.uid in opened else LOG_COMMIT) for event in events} | {
+        (uid, LOG_CLOSE) for uid in opened
+    }
+
+
+def test_whole_that_is_committed_after_its_part_closed_was_never_open(inbox: Inbox, write: Write) -> None:
+    part = thing(end=None)
+    inbox.commit(part)
+    inbox.store.close_event(part.uid, at(5))
+    write(inbox.store, [thing(part)])
+    assert [each.kind for each in inbox.entries()] == [LOG_OPEN, LOG_CLOSE, LOG_COMMIT]
 
 
 def test_repeated_commit_leaves_no_entry(inbox: Inbox, write: Write) -> None:
@@ -250,12 +278,15 @@ def test_parts_stand_before_their_wholes(inbox: Inbox, seed: int) -> None:
     kinds = [(each.uid, each.kind) for each in inbox.entries()]
     place = {known: number for number, known in enumerate(kinds)}
     assert len(place) == len(kinds)
-    assert {uid for uid, kind in kinds if kind == LOG_COMMIT} == {event.uid for event in events}
+    came = {uid: number for (uid, kind), number in place.items() if kind != LOG_CLOSE}
+    assert came.keys() == {event.uid for event in events}
+    assert len(came) == sum(kind != LOG_CLOSE for _, kind in kinds)
+    assert {uid for uid, kind in kinds if kind == LOG_OPEN} == going_on
     assert {uid for uid, kind in kinds if kind == LOG_CLOSE} == going_on
     for event in events:
-        assert all(place[part, LOG_COMMIT] < place[event.uid, LOG_COMMIT] for part in event.parts)
+        assert all(came[part] < came[event.uid] for part in event.parts)
     for uid in going_on:
-        assert place[uid, LOG_COMMIT] < place[uid, LOG_CLOSE]
+        assert came[uid] < place[uid, LOG_CLOSE]
     for event in events:
         closing = going_on.intersection(event.parts)
         assert all(place[part, LOG_CLOSE] < place[event.uid, LOG_CLOSE] for part in closing)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import runpy
 import shutil
 import subprocess
 import sys
@@ -20,18 +21,20 @@ import pytest
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
 from geoalchemy2 import Geometry, alembic_helpers
+from psycopg import sql
 from sqlalchemy import NullPool, create_engine
 
 import elm
 from elm import cues
 from elm.errors import InvalidValue, MemoryMissing, SchemaMismatch
 from elm.event import Event
+from elm.log import LogKind
 from elm.storage import migrate
 from elm.storage.postgres import PostgresStore
 from elm.storage.tables import REVISION, metadata
 from elm.store import Arrival, Query
 from elm.taxonomy import EventType
-from tests.clock import span
+from tests.clock import at, span
 from tests.servers import MEMORY, Server
 
 SOURCES = Path(elm.__file__).parents[1]
@@ -365,6 +368,59 @@ def test_migration_that_fails_leaves_the_memory_as_it_was(
     assert "StoreFailure" in said
     assert catalogue(dsn, MEMORY) == before
     assert [found.uid for found in stores(MEMORY).find(Query())] == [event.uid]
+
+
+# From one schema to the next
+
+
+@pytest.fixture
+def first_schema(dsn: str) -> str:
+    """A memory as the first migration made it, without events."""
+    script = runpy.run_path(str(SOURCES / "alembic" / "versions" / "0001_memory.py"))
+    with psycopg.connect(dsn) as connection:
+        connection.execute("CREATE SCHEMA old")
+        connection.execute("SET search_path = old, public")
+        for statement in script["STATEMENTS"]:
+            connection.execute(statement)
+        connection.execute("CREATE TABLE alembic_version (version_num varchar(32) PRIMARY KEY)")
+        connection.execute("INSERT INTO alembic_version VALUES ('0001')")
+    return "old"
+
+
+def test_the_first_schema_gains_a_log_and_keeps_its_inbox(
+    dsn: str, first_schema: str, stores: Callable[[str], PostgresStore]
+) -> None:
+    """Which did not tell open events from others: those that were closed later were open, and those that still are."""
+    now = stores(MEMORY)
+    now.add_types([EventType(name="Thing")])
+    ended, closed, going_on = (Event(type="Thing", interval=span(0, end)) for end in (1, None, None))
+    events = [
+        *(ended, closed, going_on),
+        *(Event(type="Thing", parts=[part.uid], agent="a") for part in (ended, closed, going_on)),
+    ]
+    for event in events:
+        now.commit(Arrival(event=event))
+    now.close_event(closed.uid, at(5))
+    with psycopg.connect(dsn, options=f"-c search_path={first_schema}") as connection:
+        for table in ("event_type", "type_closure", "event", "part"):
+            copied = sql.SQL("INSERT INTO {0} OVERRIDING SYSTEM VALUE SELECT * FROM {1}.{0}")
+            connection.execute(copied.format(sql.Identifier(table), sql.Identifier(MEMORY)))
+        inbox = sql.SQL(
+            "INSERT INTO log_inbox (event_id, kind, agent, at)"
+            " SELECT event_id, CASE kind WHEN 3 THEN 1 ELSE kind END, agent, at FROM {}.log_inbox ORDER BY n"
+        )
+        connection.execute(inbox.format(sql.Identifier(MEMORY)))
+        kinds = connection.execute("SELECT kind FROM log_inbox ORDER BY n").fetchall()
+        assert [kind for (kind,) in kinds] == [1, 1, 1, 1, 1, 1, 2, 2]
+    assert migrate(dsn, first_schema) == f"migrated memory {first_schema!r} from schema 0001 to {REVISION}"
+    for kind, found in catalogue(dsn, first_schema).items():
+        assert found == catalogue(dsn, MEMORY)[kind]
+    old = stores(first_schema)
+    assert old.log.head() == now.log.head() == 8
+    assert old.log.read(0, 100) == now.log.read(0, 100)
+    opened = {entry.event.uid for entry in old.log.read(0, 100) if entry.event and entry.kind is LogKind.OPEN}
+    assert opened == {closed.uid, going_on.uid, events[4].uid, events[5].uid}
+    assert old.log.register("a", position=8).position == 8
 
 
 # Side by side

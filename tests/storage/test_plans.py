@@ -88,6 +88,9 @@ def life(postgres_server: Server) -> Iterator[Life]:
         memory.add_type("Inspection")
         report = memory.load(_life(), batch=10_000)
         assert (report.new, report.refused) == (EVENTS, 0)
+        with store._connections.writing() as connection:
+            # Empties the pending lists of the inverted indexes, as the server does by itself some time after a load.
+            connection.execute("VACUUM (ANALYZE) event, part")
         window = cues.time("subset", World().begin + timedelta(hours=20), World().begin + timedelta(hours=21))
         event = next(
             each
@@ -265,25 +268,31 @@ FEW: Mapping[str, Ask] = {
 """Cues that a few events match: of every kind for which that can be, and that an index serves."""
 
 
-_UNSOLVED = {
-    "feature_names.subset": "every event that shares a name with the cue is visited",
-    "feature_names.equal": "five long posting lists, and what is still pending of the inverted index: 52 pages",
-    "feature_names.superset": "five long posting lists, and what is still pending of the inverted index: 52 pages",
-    "wholes": "nine events are found by their keys, or asked for their wholes: some eight pages an event",
-}
+_UNSOLVED = {"feature_names.subset": "every event that shares a name with the cue is visited: 11,400 pages"}
 """What takes more pages than it should, and why."""
+
+# An event is reached by its uid in 4 pages and by its id in 3; its links are reached in 3, and one more as long as the
+# server has not vacuumed: nine events that are named by the cue or found for it are over the bound in any plan. The
+# relation "equal" looks at the links of each once more, and "transitive" looks for further links of each.
+KIN_BUFFERS: Mapping[str, int] = {
+    "parts.intersects": 80,
+    "parts, transitive.equal": 170,
+    "parts, transitive.superset": 110,
+    "parts, transitive.intersects": 110,
+    "wholes.equal": 120,
+    "wholes.superset": 80,
+    "wholes.intersects": 80,
+    "wholes, transitive.equal": 180,
+    "wholes, transitive.superset": 100,
+    "wholes, transitive.intersects": 100,
+}
+"""The bounds of cues that name nine events or find nine."""
 
 
 def _small() -> Iterator[ParameterSet]:
     for name in FEW:
-        reason = _UNSOLVED.get(name, _UNSOLVED["wholes"] if name in _OF_NINE else None)
-        yield pytest.param(name, marks=() if reason is None else pytest.mark.xfail(reason=reason, strict=False))
-
-
-_OF_NINE = [
-    *(f"wholes{deep}.{relation}" for deep in ("", ", transitive") for relation in ("equal", "superset", "intersects")),
-    *("parts.intersects", "parts, transitive.equal", "parts, transitive.superset", "parts, transitive.intersects"),
-]
+        marks = [pytest.mark.xfail(reason=_UNSOLVED[name], strict=True)] if name in _UNSOLVED else []
+        yield pytest.param(name, marks=marks)
 
 
 @pytest.mark.parametrize("name", [*_small()])
@@ -291,14 +300,16 @@ def test_few_rows_are_found_in_few_buffers(life: Life, name: str) -> None:
     cue = FEW[name](life)
     costs = [cost(life.store, Query(cue=cue, order=order)) for order in _ORDERS]
     assert all(0 < each.rows <= FEW_ROWS for each in costs), f"the cue is no example: {costs[0]}"
-    assert [str(each) for each in costs if each.buffers >= FEW_BUFFERS or each.scanned] == []
+    most = KIN_BUFFERS.get(name, FEW_BUFFERS)
+    assert [str(each) for each in costs if each.buffers >= most or each.scanned] == []
 
 
-@pytest.mark.parametrize("name", [name for name in FEW if name != "feature_names.subset"])
-def test_with_a_limit_few_rows_cost_a_bounded_walk_more(life: Life, name: str) -> None:
+@pytest.mark.parametrize("name", [*_small()])
+def test_with_a_limit_few_rows_cost_a_glance_more(life: Life, name: str) -> None:
     cue = FEW[name](life)
     costs = [cost(life.store, Query(cue=cue, order=order, limit=FEW_ROWS)) for order in _ORDERS]
-    most = FEW_BUFFERS + recall_statements.WALK_FEWEST
+    # The rows glanced at first stand together, about two on a page; each row of the answer is read once more.
+    most = KIN_BUFFERS.get(name, FEW_BUFFERS + 2 * FEW_ROWS)
     assert [str(each) for each in costs if each.buffers >= most or each.scanned] == []
 
 
@@ -313,28 +324,18 @@ WITHOUT_INDEX: Mapping[str, Ask] = {
 }
 
 
-_ALONG_BEGIN = pytest.mark.xfail(reason="the planner reads along the begin index to save the sort", strict=False)
-
-
-@pytest.mark.parametrize(
-    ("name", "limit"),
-    [
-        pytest.param(
-            name,
-            limit,
-            marks=_ALONG_BEGIN if limit is None and name in ("duration.>", "region.disjoint", "parts.disjoint") else (),
-        )
-        for name in WITHOUT_INDEX
-        for limit in (None, FEW_ROWS)
-    ],
-)
+@pytest.mark.parametrize("limit", [None, FEW_ROWS])
+@pytest.mark.parametrize("name", WITHOUT_INDEX)
 def test_without_an_index_no_page_is_read_twice(life: Life, name: str, limit: int | None) -> None:
     with life.store._connections.recalling() as connection:
         ((pages,),) = connection.execute("SELECT relpages FROM pg_class WHERE oid = 'event'::regclass").fetchall()
+    # What is disjoint are most events as a rule. They are read along the begin index, so that the first are there at
+    # once and no memory is needed to sort all of them: a page is read again after a whole that stands elsewhere.
+    passes = 2.6 if name == "region.disjoint" and limit is None else 1.2
     for order in _ORDERS:
         found = cost(life.store, Query(cue=WITHOUT_INDEX[name](life), order=order, limit=limit))
         assert found.rows <= FEW_ROWS
-        assert found.buffers < 1.2 * pages, f"{order}: {found} of {pages} pages"
+        assert found.buffers < passes * pages, f"{order}: {found} of {pages} pages"
 
 
 # The first of many rows
@@ -361,26 +362,16 @@ MANY: Mapping[str, Ask] = {
 """Cues that many events match, most of them not the very last."""
 
 
-_COLLECTED = pytest.mark.xfail(
-    reason="what few of the walked events are, or is dear to judge, is collected", strict=False
-)
-
-
-@pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param(
-            name, marks=_COLLECTED if name in ("type.is_a", "wholes.subset", "wholes.subset, transitive") else ()
-        )
-        for name in MANY
-    ],
-)
+@pytest.mark.parametrize("name", MANY)
 def test_first_rows_of_many_are_found_by_a_bounded_walk(life: Life, name: str) -> None:
     cue = MANY[name](life)
     assert life.store.count(cue) > 5_000
     costs = [cost(life.store, Query(cue=cue, order=order, limit=FEW_ROWS)) for order in _ORDERS]
     assert all(each.rows == FEW_ROWS for each in costs)
-    assert [str(each) for each in costs if each.buffers >= 1_500 or each.scanned] == []
+    # Whether a type is one of those below another takes up to three pages more of each event walked past.
+    most = 2_000 if name == "type.is_a" else 500
+    # A few pages from the table's begin are no scan: of what most events match it has a handful soonest.
+    assert [str(each) for each in costs if each.buffers >= most] == []
 
 
 # What correlates with time
@@ -421,7 +412,7 @@ def test_limited_recall_is_bounded_by_its_hits(life: Life, name: str, order: Ord
     """Whatever the limit, no more is touched than all hits and the rows of a bounded walk need."""
     cue = CORRELATED[name](life)
     assert NEW - 100 < life.store.count(cue) <= NEW
-    for limit, most in ((1, 350), (10, 450), (100, 1_600), (1_000, 5_000), (recall_statements.WALK_MOST, 5_000)):
+    for limit, most in ((1, 400), (10, 450), (100, 1_500), (1_000, 5_000), (recall_statements.WALK_MOST, 5_000)):
         found = cost(life.store, Query(cue=cue, order=order, limit=limit))
         assert found.rows == min(limit, life.store.count(cue))
         assert found.buffers < most, f"limit {limit}: {found}"
@@ -453,8 +444,8 @@ def test_nearest_walks_the_index(life: Life) -> None:
     assert here is not None
     found = cost(life.store, Query(order=Nearest(to=here), limit=FEW_ROWS))
     assert found.rows == FEW_ROWS
-    # Some hundred to walk the index by distance, and a few for each row and its wholes.
-    assert found.buffers < 150
+    # Some forty to walk the index by distance, and four for each row and its wholes.
+    assert found.buffers < 100
     assert not found.scanned
 
 

@@ -7,7 +7,7 @@ import json
 import math
 import os
 from collections.abc import Iterator
-from itertools import islice
+from itertools import islice, pairwise
 from pathlib import Path
 from typing import Any
 from uuid import UUID
@@ -19,7 +19,7 @@ import elm
 from elm import cues
 from elm.errors import StoreFailure
 from elm.interval import Interval
-from simulators import hand_sql, hierarchy
+from simulators import at_once, bounded, engine, habits, hand_sql, handling, hierarchy
 from simulators.__main__ import main
 from simulators.classes import check_same
 from simulators.events import simulate
@@ -110,6 +110,46 @@ def test_recall_measures_every_class_and_large_answers(
     assert schemas(dsn) == set()
 
 
+def test_recognize_measures_rates_latency_and_memory(
+    dsn: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(engine, "ENVIRONMENT", tmp_path / "nothing")
+    size = ("--events", "600", "--matches", "2", "--stream", "3000")
+    found = measured(tmp_path, "recognize", "--quick", *size, "--dsn", dsn)
+    for key in ("twenty_vs_one", "db_vs_load", "latency_vs_commit", "memory_bounded"):
+        assert is_positive(found[key])
+        assert found["goals"][key]["value"] == found[key]
+    assert found["engine_vs_bobocep"] is None
+    assert found["engine_vs_bobocep_divided"] is None
+    assert "engine_vs_bobocep" not in found["goals"]
+    rates = found["twenty"]
+    assert found["twenty_vs_one"] == pytest.approx(rates["one_events_per_second"] / rates["twenty_events_per_second"])
+    assert len(rates["matches"]) == 20
+    database = found["database"]
+    assert found["db_vs_load"] == pytest.approx(database["events_per_second"] / database["load_events_per_second"])
+    assert 10 <= database["events_per_result"] <= 20
+    latency = found["latency"]
+    assert found["latency_vs_commit"] == pytest.approx(
+        latency["in_process"]["median"] / latency["bare_commit"]["median"], rel=0.01
+    )
+    assert latency["in_process"]["count"] == latency["own_process"]["count"] == 2
+    assert [stage["events"] for stage in found["stream"]["stages"]] == [300, 1500, 3000]
+    said = capsys.readouterr()
+    assert "run `make opponents`" in said.err
+    assert "manager in a process of its own" in said.out
+    assert schemas(dsn) == set()
+
+
+def test_both_engines_find_the_same() -> None:
+    if not (engine.ENVIRONMENT / "bin" / "python").exists():
+        pytest.skip(engine.MISSING)
+    found = engine.measure(events=500, rounds=1, seed=3, advance=lambda more: None)
+    rates = found["events_per_second"]
+    assert found["engine_vs_bobocep"] == pytest.approx(rates["elm"] / rates["bobocep_together"])
+    assert found["engine_vs_bobocep_divided"] == pytest.approx(rates["elm"] / rates["bobocep_divided"])
+    assert found["matches"] > 10
+
+
 def test_types_measures_a_hierarchy_end_to_end(dsn: str, tmp_path: Path) -> None:
     file = tmp_path / "synsets.tsv"
     file.write_text(SYNSETS, encoding="utf-8")
@@ -197,6 +237,52 @@ def test_different_answers_are_no_measurement() -> None:
         check_same("type.exactly", cues.everything(), [1, 2], [2])
     with pytest.raises(StoreFailure, match="another order"):
         check_same("type.exactly", cues.everything(), [1, 2], [2, 1])
+
+
+def test_engines_that_find_different_numbers_are_no_measurement() -> None:
+    engine.check_same({"elm": 3, "bobocep_together": 3})
+    with pytest.raises(StoreFailure, match="different numbers of matches"):
+        engine.check_same({"elm": 3, "bobocep_together": 2})
+
+
+def test_patterns_that_find_something_else_in_company_are_no_measurement() -> None:
+    at_once.check_same({"fetch": 3, "wiped": 2}, {"fetch": 3, "wiped": 2})
+    with pytest.raises(StoreFailure, match=r"other numbers.*'wiped': \(2, 1\)"):
+        at_once.check_same({"fetch": 3, "wiped": 2}, {"fetch": 3, "wiped": 1})
+
+
+def test_a_process_that_ends_before_it_answers_is_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    python = tmp_path / "bin" / "python"
+    python.parent.mkdir()
+    python.write_text("#!/bin/sh\nexit 1\n")
+    python.chmod(0o755)
+    monkeypatch.setattr(engine, "ENVIRONMENT", tmp_path)
+    with pytest.raises(StoreFailure, match="ended before it"):
+        engine.measure(events=20, rounds=1, seed=1, advance=lambda more: None)
+
+
+def test_every_one_of_the_twenty_patterns_finds_something() -> None:
+    found = at_once.measure(events=6000, rounds=1, seed=1, advance=lambda more: None)
+    assert list(found["matches"]) == [each.name for each in habits.twenty()]
+    assert min(found["matches"].values()) > 0
+
+
+def test_handling_is_a_stream_of_ascending_instants_that_repeats_for_a_seed() -> None:
+    first, again, other = (list(islice(handling.live(seed, objects=3, replaced=10), 25)) for seed in (1, 1, 2))
+    assert first == again != other
+    assert all(before.moment < after.moment for before, after in pairwise(first))
+    objects = [{done.object for done in first[at : at + 10]} for at in (0, 10, 20)]
+    assert not objects[0] & objects[1]
+    assert not objects[1] & objects[2]
+
+
+def test_memory_is_watched_in_a_process_of_its_own() -> None:
+    stages = list(bounded.stages(2000, seed=1))
+    assert [stage["events"] for stage in stages] == [200, 1000, 2000]
+    assert all(stage["runs"] <= stage["most_runs"] for stage in stages)
+    assert stages[-1]["matches"] > 100
+    # Not that of this process, which holds much more.
+    assert bounded.measure(events=2000, seed=1)["stages"][-1]["peak_mb"] < stages[-1]["peak_mb"]
 
 
 def test_twins_have_the_indexes_and_constraints_of_the_tables(dsn: str) -> None:

@@ -41,6 +41,7 @@ def run(*arguments: str, **settings: str) -> subprocess.CompletedProcess[str]:
         (("--version",), {}, "elm "),
         (("recall", "--help"), {}, "--near"),
         (("types", "load", "--help"), {}, "--wordnet"),
+        (("recognize", "run", "--help"), {}, "--lateness"),
         ((), {"_ELM_COMPLETE": "complete_bash", "COMP_WORDS": "elm rec", "COMP_CWORD": "1"}, "recall"),
         ((), {"_ELM_COMPLETE": "complete_bash", "COMP_WORDS": "elm recall --li", "COMP_CWORD": "2"}, "--limit"),
     ],

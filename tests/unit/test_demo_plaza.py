@@ -1,4 +1,4 @@
-"""Tests of the mower's demo: what its loader finds against the raw files, its questions, its tour and its picture."""
+"""Tests of the mower's demo: what it finds against the raw files and an oracle, its questions, tour and picture."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import os
 import struct
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from io import StringIO
 from itertools import pairwise
@@ -19,16 +19,21 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from rich.console import Console
 
 import elm.demo
 from elm import cues
 from elm.app import Memory
-from elm.demo import episodes, motion, plaza, questions, recording
+from elm.demo import by_run, motion, mower_recognizers, plaza, questions, recording
 from elm.errors import MissingPackage
-from elm.event import Event, content_hash
+from elm.event import Event, StoredEvent, content_hash
+from elm.geometry import Region
 from elm.interval import Interval
+from elm.recognizers.base import OUTPUT, RECOGNIZER, VERSION
 from elm.storage.memory import MemoryStore
+from tests.unit import mower_episodes
 
 Numbers = npt.NDArray[np.float64]
 DATA = Path(elm.demo.__file__).parent / "data"
@@ -63,19 +68,51 @@ def _raw(name: str) -> Raw:
 RAW = {name: _raw(name) for name in NAMES}
 
 
-@pytest.fixture(scope="module")
-def runs() -> dict[str, plaza.Run]:
-    return {name: plaza.load(name) for name in NAMES}
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Lived:
+    """One run as loaded, and the episodes that were recognized in it."""
+
+    motions: tuple[Event, ...]
+    contacts: tuple[Event, ...]
+    rows: tuple[Event, ...]
+    laps: tuple[Event, ...]
+    session: Event
+
+    @property
+    def events(self) -> list[Event]:
+        return [*self.motions, *self.contacts, *self.rows, *self.laps, self.session]
 
 
 @pytest.fixture(scope="module")
-def memory(runs: dict[str, plaza.Run]) -> Memory:
+def memory() -> Memory:
     filled = Memory(MemoryStore(memory="demo"))
     filled.add_types(plaza.TYPES)
-    for run in runs.values():
-        report = filled.load(run.events)
-        assert report.refused == 0
+    runs = plaza.load_all()
+    report = filled.load(event for run in runs for event in run.events)
+    assert (report.new, report.refused) == (463, 0)
+    mower_recognizers.recognize(filled, runs)
     return filled
+
+
+@pytest.fixture(scope="module")
+def runs(memory: Memory) -> dict[str, Lived]:
+    lived = {}
+    for name in NAMES:
+        loaded = plaza.load(name)
+        (session,) = _recognized(memory, "Session", name)
+        lived[name] = Lived(
+            motions=loaded.motions,
+            contacts=loaded.contacts,
+            rows=_recognized(memory, "Row", name),
+            laps=_recognized(memory, "Lap", name),
+            session=session,
+        )
+    return lived
+
+
+def _recognized(memory: Memory, kind: str, frame: str) -> tuple[Event, ...]:
+    found = memory.recall(cues.exactly(kind))
+    return tuple(event.as_event() for event in found if event.region is not None and event.region.frame == frame)
 
 
 def _seconds(interval: Interval | None) -> tuple[float, float]:
@@ -138,7 +175,7 @@ def test_what_is_odd_is_counted() -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_motions_meet_and_last_as_long_as_the_run(runs: dict[str, plaza.Run], name: str) -> None:
+def test_motions_meet_and_last_as_long_as_the_run(runs: dict[str, Lived], name: str) -> None:
     motions, raw = runs[name].motions, RAW[name]
     spans = [_seconds(event.interval) for event in motions]
     assert spans[0][0] == pytest.approx(raw.path[0, 0], abs=1e-6)
@@ -149,7 +186,7 @@ def test_motions_meet_and_last_as_long_as_the_run(runs: dict[str, plaza.Run], na
 
 
 @pytest.mark.parametrize(("name", "metres"), [("plaza1", 1858.980), ("plaza2", 1353.862)])
-def test_distances_add_up_to_the_path(runs: dict[str, plaza.Run], name: str, metres: float) -> None:
+def test_distances_add_up_to_the_path(runs: dict[str, Lived], name: str, metres: float) -> None:
     run, path = runs[name], RAW[name].path
     total = np.hypot(*np.diff(path[:, 1:3], axis=0).T).sum()
     assert total == pytest.approx(metres, abs=0.01)
@@ -158,7 +195,7 @@ def test_distances_add_up_to_the_path(runs: dict[str, plaza.Run], name: str, met
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_turns_and_drives_have_the_angles_and_speeds_of_the_path(runs: dict[str, plaza.Run], name: str) -> None:
+def test_turns_and_drives_have_the_angles_and_speeds_of_the_path(runs: dict[str, Lived], name: str) -> None:
     raw = RAW[name]
     for event in runs[name].motions:
         rows = raw.between(event.interval or Interval.at(MIDNIGHT))
@@ -179,7 +216,7 @@ def test_turns_and_drives_have_the_angles_and_speeds_of_the_path(runs: dict[str,
             assert _apart(_number(event, "heading"), course) < 0.06
 
 
-def test_the_path_stands_still_only_in_stands(runs: dict[str, plaza.Run]) -> None:
+def test_the_path_stands_still_only_in_stands(runs: dict[str, Lived]) -> None:
     path = RAW["plaza1"].path
     frozen = path[1:][(np.diff(path[:, 1:3], axis=0) == 0).all(axis=1), 0]
     stands = [_seconds(event.interval) for event in runs["plaza1"].motions if event.type == "Stand"]
@@ -190,7 +227,7 @@ def test_the_path_stands_still_only_in_stands(runs: dict[str, plaza.Run]) -> Non
     assert len(stands) == 10
 
 
-def test_a_motion_sweeps_its_path(runs: dict[str, plaza.Run]) -> None:
+def test_a_motion_sweeps_its_path(runs: dict[str, Lived]) -> None:
     raw = RAW["plaza2"]
     for event in runs["plaza2"].motions:
         assert event.region is not None
@@ -205,7 +242,7 @@ def test_a_motion_sweeps_its_path(runs: dict[str, plaza.Run]) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_contacts_are_merged_readings(runs: dict[str, plaza.Run], name: str) -> None:
+def test_contacts_are_merged_readings(runs: dict[str, Lived], name: str) -> None:
     raw, gap = RAW[name], {"plaza1": 5.0, "plaza2": 1.25}[name]
     found = runs[name].contacts
     assert sum(_number(event, "readings") for event in found) == len(raw.ranges)
@@ -231,7 +268,7 @@ def test_contacts_are_merged_readings(runs: dict[str, plaza.Run], name: str) -> 
             assert [(float(time), float(metres)) for time, metres in rows[1:]] == expected
 
 
-def test_a_single_reading_is_an_instant(runs: dict[str, plaza.Run]) -> None:
+def test_a_single_reading_is_an_instant(runs: dict[str, Lived]) -> None:
     singles = [event for event in runs["plaza2"].contacts if event.value("readings") == 1]
     assert len(singles) == 18
     for event in singles:
@@ -243,7 +280,7 @@ def test_a_single_reading_is_an_instant(runs: dict[str, plaza.Run]) -> None:
 
 
 @pytest.mark.parametrize(("name", "rows", "laps"), [("plaza1", 42, 20), ("plaza2", 21, 7)])
-def test_rows_and_laps_as_counted_by_eye(runs: dict[str, plaza.Run], name: str, rows: int, laps: int) -> None:
+def test_rows_and_laps_as_counted_by_eye(runs: dict[str, Lived], name: str, rows: int, laps: int) -> None:
     run = runs[name]
     assert (len(run.rows), len(run.laps)) == (rows, laps)
     assert [row.value("number") for row in run.rows] == list(range(1, rows + 1))
@@ -251,7 +288,7 @@ def test_rows_and_laps_as_counted_by_eye(runs: dict[str, plaza.Run], name: str, 
     assert sum(_number(lap, "rows") for lap in run.laps) == rows
 
 
-def test_rows_up_and_down_against_the_raw_headings(runs: dict[str, plaza.Run]) -> None:
+def test_rows_up_and_down_against_the_raw_headings(runs: dict[str, Lived]) -> None:
     """From the start of the mowing proper on, the heading swings between two directions once for each row."""
     path = RAW["plaza1"].path
     mowing = path[path[:, 0] > path[0, 0] + 284]
@@ -261,7 +298,7 @@ def test_rows_up_and_down_against_the_raw_headings(runs: dict[str, plaza.Run]) -
     assert stretches == len(runs["plaza1"].rows) - 4 == 38
 
 
-def test_laps_against_the_crossings_of_a_line(runs: dict[str, plaza.Run]) -> None:
+def test_laps_against_the_crossings_of_a_line(runs: dict[str, Lived]) -> None:
     """Every lap of the second run crosses the south side, at x = -20 m, once from east to west."""
     path = RAW["plaza2"].path
     south = path[path[:, 2] < 15]
@@ -270,7 +307,7 @@ def test_laps_against_the_crossings_of_a_line(runs: dict[str, plaza.Run]) -> Non
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_rows_are_as_defined(runs: dict[str, plaza.Run], name: str) -> None:
+def test_rows_are_as_defined(runs: dict[str, Lived], name: str) -> None:
     run = runs[name]
     place = {event.uid: index for index, event in enumerate(run.motions)}
     taken: list[int] = []
@@ -304,41 +341,161 @@ def test_rows_are_as_defined(runs: dict[str, plaza.Run], name: str) -> None:
         assert breaks
 
 
-def _bare(event: Event) -> Event:
-    """The event with no more than the definitions of rows and laps may look at."""
-    kept = {name: value for name, value in event.features if name in {"distance", "heading", "turn"}}
-    return Event(type=event.type, interval=event.interval, features=kept, uid=event.uid)
+MARKS = {RECOGNIZER, VERSION, OUTPUT}
+
+
+def _told(events: Sequence[Event], names: dict[UUID, str]) -> list[object]:
+    """What episodes are: type, features but for the recognizer's, and parts in their order; parts that are episodes
+    by name, for recognized ones have other uids."""
+    return [
+        (
+            event.type,
+            {(name, value) for name, value in event.features if name not in MARKS},
+            [names.get(part, part) for part in event.parts],
+        )
+        for event in events
+    ]
+
+
+def _named(rows: Sequence[Event], laps: Sequence[Event]) -> dict[UUID, str]:
+    return {event.uid: f"{event.type} {event.value('number')}" for event in (*rows, *laps)}
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_episodes_are_found_from_atomic_events_in_a_memory(
-    runs: dict[str, plaza.Run], memory: Memory, name: str
-) -> None:
+def test_what_is_recognized_is_what_the_oracle_finds(runs: dict[str, Lived], name: str) -> None:
     run = runs[name]
-    in_run = cues.wholes("superset", [run.session.uid], transitive=True)
-    motions = [_bare(event.as_event()) for event in memory.recall(cues.is_a("Motion") & in_run)]
-    contacts = [_bare(event.as_event()) for event in memory.recall(cues.exactly("BeaconContact") & in_run)]
-    rows = list(episodes.rows(motions, lambda ordinal: plaza.uid(name, "row", ordinal)))
-    laps = list(episodes.laps(motions, rows, lambda ordinal: plaza.uid(name, "lap", ordinal)))
-    session = episodes.session(motions, contacts, rows, laps, name, plaza.uid(name, "session", 1))
-    assert rows == list(run.rows)
-    assert laps == list(run.laps)
-    assert set(session.parts) == set(run.session.parts)
+    oracle = mower_episodes.episodes(run.motions, run.contacts, name)
+    names, known = _named(oracle.rows, oracle.laps), _named(run.rows, run.laps)
+    assert _told(run.rows, known) == _told(oracle.rows, names)
+    assert _told(run.laps, known) == _told(oracle.laps, names)
+    assert _told([run.session], known) == _told([oracle.session], names)
+
+
+def test_episodes_say_who_found_them(runs: dict[str, Lived]) -> None:
+    for run in runs.values():
+        for event in (*run.rows, *run.laps, run.session):
+            recognizer = f"mower-{event.type.lower()}s"
+            assert [event.value(name) for name in (RECOGNIZER, VERSION, OUTPUT)] == [recognizer, 1, "match"]
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_session_is_a_run_without_pause(runs: dict[str, plaza.Run], name: str) -> None:
+def test_beacon_visits_are_stretches_of_motions_near_a_beacon(
+    runs: dict[str, Lived], memory: Memory, name: str
+) -> None:
+    """In the raw path the mower was near a beacon in the motions of its visits and passages, and in no others."""
+    path = RAW[name].path
+    found = [*memory.recall(cues.exactly("BeaconVisit") | cues.exactly("BeaconPassage"))]
+    reach = mower_recognizers.NEAR_BEACON + plaza.FOOTPRINT + plaza.BEACON_RADIUS
+    for number, x, y in RAW[name].beacons:
+        near = np.hypot(path[:, 1] - x, path[:, 2] - y) < reach
+        expected: list[list[UUID]] = []
+        was_near = False
+        for event in runs[name].motions:
+            begin, end = _seconds(event.interval)
+            is_near = bool(near[(path[:, 0] >= begin - 1e-6) & (path[:, 0] <= end + 1e-6)].any())
+            if is_near and not was_near:
+                expected.append([])
+            if is_near:
+                expected[-1].append(event.uid)
+            was_near = is_near
+        visits = [event for event in found if event.value("place") == f"beacon {number:g} of {name}"]
+        assert [list(visit.parts) for visit in visits] == expected
+        for visit in visits:
+            begin, end = _seconds(visit.interval)
+            assert visit.type == ("BeaconVisit" if end - begin >= 10 else "BeaconPassage")
+            assert visit.value("motions") == len(visit.parts)
+    assert len(found) == 27
+    assert sum(visit.type == "BeaconVisit" for visit in found) == 8
+
+
+def _remember(motions: Sequence[Event], *, batch: int = 2_000, runs_of: int = 10**6) -> Memory:
+    """The episodes of made-up motions; a new manager takes over after every so many."""
+    made = Memory(MemoryStore(memory="made"))
+    made.add_types(plaza.TYPES)
+    for first in range(0, len(motions), runs_of):
+        made.load(motions[first : first + runs_of])
+        made.recognition(mower_recognizers.RECOGNIZERS, batch=batch).catch_up()
+    made.punctuate(MIDNIGHT + timedelta(days=300), agent=plaza.AGENT)
+    made.recognition(mower_recognizers.RECOGNIZERS, batch=batch).catch_up()
+    return made
+
+
+MADE = st.lists(
+    st.one_of(
+        st.tuples(
+            st.just("Drive"), st.sampled_from([1.0, 2.9, 3.0, 5.0, 12.5]), st.sampled_from([0.0, 20, 50, 180, 350])
+        ),
+        st.tuples(st.just("Turn"), st.just(0.5), st.sampled_from([-120.0, -40, 30, 90, 180])),
+        st.tuples(st.just("Stand"), st.just(0.0), st.just(0.0)),
+    ),
+    min_size=1,
+    max_size=40,
+)
+
+
+@settings(max_examples=60, deadline=None)
+@given(given=MADE, batch=st.sampled_from([1, 3, 2_000]), runs_of=st.integers(1, 40))
+def test_random_motions_make_the_episodes_of_the_oracle(
+    given: list[tuple[str, float, float]], batch: int, runs_of: int
+) -> None:
+    """Whatever the batches, and whenever another manager goes on from what the one before left."""
+    motions = _made(*given)
+    with _remember(motions, batch=batch, runs_of=runs_of) as made:
+        rows, laps = _recognized(made, "Row", "made"), _recognized(made, "Lap", "made")
+        sessions = _recognized(made, "Session", "made")
+        assert not any(each.is_failing for each in made.recognition(mower_recognizers.RECOGNIZERS).status())
+    oracle = mower_episodes.episodes(motions, (), "made")
+    names, known = _named(oracle.rows, oracle.laps), _named(rows, laps)
+    assert _told(rows, known) == _told(oracle.rows, names)
+    assert _told(laps, known) == _told(oracle.laps, names)
+    assert _told(sessions, known) == _told([oracle.session], names)
+
+
+def test_a_run_of_too_many_events_is_cut(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(by_run, "MOST_HELD", 50)
+    motions = _made(*[("Stand", 0.0, 0.0)] * 120)
+    with _remember(motions, batch=1) as made:
+        sessions = _recognized(made, "Session", "made")
+        assert [len(session.parts) for session in sessions] == [51, 51, 18]
+        assert not any(each.is_failing for each in made.recognition(mower_recognizers.RECOGNIZERS).status())
+
+
+def test_a_run_ends_after_a_pause() -> None:
+    one, two, three = _made(("Drive", 10, 0), ("Drive", 10, 0), ("Drive", 10, 0))
+    at = MIDNIGHT + timedelta(seconds=20) + by_run.PAUSE
+    within = replace(three, interval=Interval(begin=at - timedelta(seconds=1), end=at))
+    after = replace(three, interval=Interval(begin=at - timedelta(seconds=1), end=at + timedelta(microseconds=1)))
+    for last, expected in ((within, [3]), (after, [2, 1])):
+        with _remember([one, two, last]) as made:
+            for kind, number in (("Session", None), ("Row", 1)):
+                found = [*made.recall(cues.exactly(kind))]
+                assert [len(_atomic(made, event)) for event in found] == expected
+                assert {event.value("number") for event in found} == {number}
+
+
+def _atomic(memory: Memory, event: StoredEvent) -> set[UUID]:
+    below = cues.wholes("superset", [event.uid], transitive=True) & cues.is_a("Motion")
+    return {part.uid for part in memory.recall(below)}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_session_is_a_run_without_pause(runs: dict[str, Lived], name: str) -> None:
     run = runs[name]
     spans = sorted(_seconds(event.interval) for event in (*run.motions, *run.contacts))
     latest = spans[0][1]
     for begin, end in spans:
-        assert begin - latest < 60
+        assert begin - latest < by_run.PAUSE.total_seconds()
         latest = max(latest, end)
+
+
+def _rows_of(made: list[Event]) -> list[list[UUID]]:
+    with _remember(made) as memory:
+        return [list(row.parts) for row in memory.recall(cues.exactly("Row"))]
 
 
 def test_short_drives_of_another_heading_do_not_end_a_row() -> None:
     row = _made(("Drive", 10, 90), ("Drive", 2.9, 200), ("Drive", 10, 120), ("Turn", 0, -40))
-    assert [list(found.parts) for found in episodes.rows(row, _ordinal)] == [[event.uid for event in row]]
+    assert _rows_of(row) == [[event.uid for event in row]]
 
 
 @pytest.mark.parametrize(
@@ -357,7 +514,7 @@ def test_short_drives_of_another_heading_do_not_end_a_row() -> None:
 def test_where_rows_begin_and_end(motions: list[tuple[str, float, float]], expected: list[list[int]]) -> None:
     made = _made(*motions)
     place = {event.uid: index for index, event in enumerate(made)}
-    assert [[place[part] for part in row.parts] for row in episodes.rows(made, _ordinal)] == expected
+    assert [[place[part] for part in row] for row in _rows_of(made)] == expected
 
 
 @pytest.mark.parametrize(
@@ -373,12 +530,8 @@ def test_where_rows_begin_and_end(motions: list[tuple[str, float, float]], expec
 )
 def test_where_laps_begin_and_end(headings: list[float], expected: list[int]) -> None:
     made = _made(*(motion for heading in headings for motion in (("Drive", 10.0, heading), ("Turn", 1.0, 170.0))))
-    rows = list(episodes.rows(made, _ordinal))
-    assert [lap.value("rows") for lap in episodes.laps(made, rows, lambda n: _ordinal(100 + n))] == expected
-
-
-def _ordinal(number: int) -> UUID:
-    return plaza.uid("made", "episode", number)
+    with _remember(made) as memory:
+        assert [lap.value("rows") for lap in memory.recall(cues.exactly("Lap"))] == expected
 
 
 def _made(*given: tuple[str, float, float]) -> list[Event]:
@@ -390,7 +543,9 @@ def _made(*given: tuple[str, float, float]) -> list[Event]:
             Event(
                 type=kind,
                 interval=Interval(begin=begin, end=begin + timedelta(seconds=10)),
+                region=Region.around(0.0, 0.0, 0.5, frame="made"),
                 features={"distance": metres, "heading" if kind == "Drive" else "turn": degrees},
+                agent=plaza.AGENT,
                 uid=plaza.uid("made", "motion", index),
             )
         )
@@ -400,8 +555,8 @@ def _made(*given: tuple[str, float, float]) -> list[Event]:
 # In a memory
 
 
-def test_extents_derive_and_parts_lie_inside(runs: dict[str, plaza.Run], memory: Memory) -> None:
-    for run in runs.values():
+def test_extents_derive_and_parts_lie_inside(runs: dict[str, Lived], memory: Memory) -> None:
+    for name, run in runs.items():
         for event in (*run.rows, *run.laps, run.session):
             stored = memory.get(event.uid)
             parts = [memory.get(part) for part in event.parts]
@@ -413,12 +568,12 @@ def test_extents_derive_and_parts_lie_inside(runs: dict[str, plaza.Run], memory:
             )
             hull = shapely.MultiPoint(corners).convex_hull
             assert stored.region is not None
-            assert stored.region.frame == run.name
+            assert stored.region.frame == name
             assert shapely.hausdorff_distance(stored.region.polygon, hull) < 1e-6
             assert all(event.uid in part.wholes for part in parts)
         heard = memory.get(run.session.uid).subject
         assert heard is not None
-        assert all(heard.polygon.buffer(1e-6).contains(shapely.Point(x, y)) for _, x, y in RAW[run.name].beacons)
+        assert all(heard.polygon.buffer(1e-6).contains(shapely.Point(x, y)) for _, x, y in RAW[name].beacons)
 
 
 def _end(interval: Interval) -> datetime:
@@ -426,23 +581,38 @@ def _end(interval: Interval) -> datetime:
     return interval.end
 
 
-def test_everything_is_part_of_its_session(runs: dict[str, plaza.Run], memory: Memory) -> None:
+def test_everything_is_part_of_its_session(runs: dict[str, Lived], memory: Memory) -> None:
     for run in runs.values():
         below = memory.recall(cues.wholes("superset", [run.session.uid], transitive=True))
-        assert below.count() == sum(1 for _ in run.events) - 1
+        assert below.count() == len(run.events) - 1
 
 
-def test_loading_again_changes_nothing(runs: dict[str, plaza.Run], memory: Memory) -> None:
-    before = memory.statistics()
-    again = plaza.load_all()
+def test_doing_it_again_changes_nothing(memory: Memory) -> None:
+    before, head = memory.statistics(), memory.log.head()
+    runs, again = plaza.load_all(), plaza.load_all()
     report = memory.load(event for run in again for event in run.events)
-    assert (report.new, report.refused, report.existing) == (0, 0, before.events)
+    assert (report.new, report.refused, report.existing) == (0, 0, 463)
+    mower_recognizers.recognize(memory, again)
     assert memory.statistics() == before
-    for run in again:
-        assert [content_hash(event) for event in run.events] == [content_hash(e) for e in runs[run.name].events]
+    assert memory.log.head() == head
+    for one, other in zip(runs, again, strict=True):
+        assert [content_hash(event) for event in one.events] == [content_hash(event) for event in other.events]
 
 
-def test_the_clock_is_anchored(runs: dict[str, plaza.Run]) -> None:
+def test_what_was_left_unfinished_is_finished_the_next_time() -> None:
+    runs = plaza.load_all()
+    with Memory(MemoryStore(memory="unfinished")) as left:
+        left.add_types(plaza.TYPES)
+        left.load(runs[0].events)
+        left.recognition(mower_recognizers.RECOGNIZERS, consumer=mower_recognizers.CONSUMER).catch_up()
+        left.load(runs[1].events)
+        assert not left.recall(cues.exactly("Session")).exists()
+        mower_recognizers.recognize(left, runs)
+        counts = {group.key: group.count for group in left.recall().groups("type")}
+        assert (counts["Row"], counts["Lap"], counts["Session"]) == (63, 27, 2)
+
+
+def test_the_clock_is_anchored(runs: dict[str, Lived]) -> None:
     for name, run in runs.items():
         assert run.motions[0].interval is not None
         assert run.motions[0].interval.begin == MIDNIGHT + timedelta(seconds=RAW[name].path[0, 0])
@@ -466,7 +636,7 @@ def test_every_question_is_answered(memory: Memory) -> None:
         assert question.recall(memory).exists(), question.text
 
 
-def test_rows_near_beacon_6(runs: dict[str, plaza.Run], memory: Memory) -> None:
+def test_rows_near_beacon_6(runs: dict[str, Lived], memory: Memory) -> None:
     near = {}
     reach = 5 + plaza.FOOTPRINT + plaza.BEACON_RADIUS
     for name, run in runs.items():
@@ -492,7 +662,7 @@ def test_last_near_beacon_0(memory: Memory) -> None:
     assert "row 13 of plaza1, in lap 6 of plaza1" in _asked(memory, "When was it last")[0]
 
 
-def test_contacts_at_stands(runs: dict[str, plaza.Run], memory: Memory) -> None:
+def test_contacts_at_stands(runs: dict[str, Lived], memory: Memory) -> None:
     overlapping = 0
     for run in runs.values():
         stands = [_seconds(event.interval) for event in run.motions if event.type == "Stand"]
@@ -501,7 +671,7 @@ def test_contacts_at_stands(runs: dict[str, plaza.Run], memory: Memory) -> None:
     assert _asked(memory, "Which beacon contacts")[0].startswith(f"{overlapping} contacts: ")
 
 
-def test_the_last_contact_before_each_turn(runs: dict[str, plaza.Run], memory: Memory) -> None:
+def test_the_last_contact_before_each_turn(runs: dict[str, Lived], memory: Memory) -> None:
     ends = [_given(contact).end for run in runs.values() for contact in run.contacts]
     back = cues.exactly("Turn") & (cues.feature("turn", ">=", 90) | cues.feature("turn", "<=", -90))
     pairs = list(memory.recall(back).latest_before(cues.exactly("BeaconContact")))
@@ -529,7 +699,7 @@ def test_stands_and_laps(memory: Memory) -> None:
     assert _asked(memory, "Which laps contain") == ["laps 1, 7, 13 and 14 of plaza1"]
 
 
-def test_far_from_every_beacon(runs: dict[str, plaza.Run], memory: Memory) -> None:
+def test_far_from_every_beacon(runs: dict[str, Lived], memory: Memory) -> None:
     places = [shapely.Point(x, y) for _, x, y in RAW["plaza1"].beacons]
     far = [
         event
@@ -539,7 +709,7 @@ def test_far_from_every_beacon(runs: dict[str, plaza.Run], memory: Memory) -> No
     assert len(_asked(memory, "What did it do in plaza1 farther")) == len(far) == 5
 
 
-def test_out_of_touch(runs: dict[str, plaza.Run], memory: Memory) -> None:
+def test_out_of_touch(runs: dict[str, Lived], memory: Memory) -> None:
     silent = []
     for run in runs.values():
         spans = [_seconds(contact.interval) for contact in run.contacts]
@@ -564,6 +734,11 @@ def _given(event: Event) -> Interval:
     return event.interval
 
 
+def test_beacons_by_the_way(memory: Memory) -> None:
+    assert _asked(memory, "Which beacons did it come")[1] == "beacon 1 of plaza2: 35.0 s in 6 times"
+    assert _asked(memory, "Which laps led by a beacon") == ["laps 1, 2, 3, 4, 5, 19 and 20 of plaza1"]
+
+
 # The tour and the picture
 
 
@@ -579,7 +754,11 @@ def test_the_tour_tells_everything() -> None:
     assert "Carnegie Mellon University" in told
     assert "BSD licence" in told
     assert "2000-01-01T00:00:00Z" in told
-    assert "Loaded 555 events" in told
+    assert "Loaded 463 events" in told
+    assert "Recognized 119 episodes" in told
+    for each in mower_recognizers.RECOGNIZERS:
+        assert f"│ {each.name} " in told
+    assert "What row 15 of plaza1 was recognized from, by mower-rows of version 1" in told
     for question in questions.QUESTIONS:
         assert question.text in told
         assert all(line in told for line in question.answer(memory))
@@ -587,7 +766,9 @@ def test_the_tour_tells_everything() -> None:
     assert "63 events by itself" in told
     assert "Picture" not in told
     assert "Loaded 0 events" in (again := _tour(memory, None))
-    assert "555 were there already" in again
+    assert "463 were there already" in again
+    assert "Recognized 0 episodes" in again
+    assert "119 were there already" in again
 
 
 def test_the_picture_is_drawn(tmp_path: Path) -> None:
@@ -627,7 +808,10 @@ def test_the_glossary_states_the_numbers_in_use() -> None:
     stated("none more than {} s after the one before in `plaza1`", [plaza.CONTACT_GAP["plaza1"] / 1000])
     stated("{} s in `plaza2`", [plaza.CONTACT_GAP["plaza2"] / 1000])
     stated("{} m radius", [plaza.FOOTPRINT])
-    stated("differ by at most {} degrees", [episodes.SAME_WAY])
-    stated("a turn of {} degrees or more", [episodes.TURN_BACK])
-    stated("a drive of {} m or more", [episodes.SHORT_DRIVE])
-    stated("less than {} m of drives", [episodes.ROW_LENGTH])
+    stated("differ by at most {} degrees", [mower_recognizers.SAME_WAY])
+    stated("a turn of {} degrees or more", [mower_recognizers.TURN_BACK])
+    stated("a drive of {} m or more", [mower_recognizers.SHORT_DRIVE])
+    stated("less than {} m of drives", [mower_recognizers.ROW_LENGTH])
+    stated("within {} m of a beacon", [mower_recognizers.NEAR_BEACON])
+    stated("at least {} s", [mower_recognizers.VISIT.total_seconds()])
+    stated("by at most {} minutes", [by_run.PAUSE.total_seconds() / 60])

@@ -1,11 +1,11 @@
-"""Tests of the rover Spirit's loader: the counts of its files, the nesting, and cues answered as the files say."""
+"""Tests of the rover Spirit: its files' counts and nesting, cues answered as they say, and what is recognized in it."""
 
 from __future__ import annotations
 
 import csv
 import math
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from itertools import pairwise
@@ -17,9 +17,9 @@ import shapely
 
 from elm import cues
 from elm.app import Memory
-from elm.demo import spirit
+from elm.demo import rover_recognizers, spirit
 from elm.errors import InvalidValue
-from elm.event import StoredEvent
+from elm.event import Event, StoredEvent
 from elm.geometry import Region
 from elm.storage.memory import MemoryStore
 from elm.store import ByFeature, Nearest
@@ -259,3 +259,112 @@ def test_rows_of_unknown_sols_are_left_out_and_counted(folder: Path, tmp_path: P
     (tmp_path / "sol_utc.tsv").write_text(table[0], encoding="utf-8")
     with pytest.raises(InvalidValue, match=r"traverse_path\.csv has no row with a sol"):
         spirit.load(tmp_path)
+
+
+# Recognized from the positions alone
+
+
+@pytest.fixture(scope="module")
+def watched(traverse: spirit.Traverse) -> Iterator[Memory]:
+    """A memory that was told of the positions, and of nothing that the loader made of them."""
+    with Memory(MemoryStore(memory="watched")) as filled:
+        filled.add_types(spirit.TYPES)
+        assert filled.load(traverse.stays).new == 8_765
+        filled.punctuate(_last_of(traverse.stays) + 3 * rover_recognizers.LONGEST, agent=spirit.AGENT)
+        manager = filled.recognition(rover_recognizers.RECOGNIZERS)
+        manager.catch_up()
+        for each in manager.status():
+            assert (each.lag, each.late, each.partial, each.dropped, each.is_failing) == (0, 0, 0, 0, False), each.name
+        yield filled
+
+
+def _last_of(events: Iterable[Event]) -> datetime:
+    return max(e.interval.end for e in events if e.interval is not None and e.interval.end is not None)
+
+
+def test_drives_are_the_loaders_drive_days(watched: Memory, memory: Memory, traverse: spirit.Traverse) -> None:
+    """All of it agrees: parts in their order, extents, and features but for the recognizer's own."""
+    drives = list(watched.recall(cues.exactly("Drive")))
+    days = {(day.value("site"), day.value("start_sol")): day for day in traverse.days}
+    assert len(drives) == len(days) == 834
+    for drive in drives:
+        day = days.pop((drive.value("site"), drive.value("start_sol")))
+        assert drive.parts == day.parts
+        assert (drive.value("distance"), drive.value("positions")) == (day.value("distance"), len(day.parts))
+        _assert_same_extent(drive, memory.get(day.uid))
+
+
+def test_site_visits_are_the_loaders_sites(watched: Memory, memory: Memory, traverse: spirit.Traverse) -> None:
+    """Their count, order, extents and drives agree. Latitude and longitude cannot: they are of a table, not of the
+    positions; nor can the uids, which are hashes."""
+    visits = list(watched.recall(cues.exactly("SiteVisit")))
+    assert [visit.value("site") for visit in visits] == [site.value("site") for site in traverse.sites]
+    assert len(visits) == 139
+    days = {day.uid: (day.value("site"), day.value("start_sol")) for day in traverse.days}
+    for visit, site in zip(visits, traverse.sites, strict=True):
+        drives = [watched.get(part) for part in visit.parts]
+        assert [(drive.value("site"), drive.value("start_sol")) for drive in drives] == [days[p] for p in site.parts]
+        assert (visit.value("distance"), visit.value("drives")) == (site.value("distance"), len(site.parts))
+        assert visit.value("latitude") is None
+        _assert_same_extent(visit, memory.get(site.uid))
+
+
+def _assert_same_extent(one: StoredEvent, other: StoredEvent) -> None:
+    assert one.interval == other.interval
+    assert one.region is not None
+    assert other.region is not None
+    assert one.region.frame == other.region.frame
+    assert shapely.hausdorff_distance(one.region.polygon, other.region.polygon) < 1e-6
+
+
+def test_standstills_against_a_search_by_hand(watched: Memory, traverse: spirit.Traverse) -> None:
+    """From each position on: how long did the rover cover that point? The loader's structure has no such thing.
+
+    What must agree with it: whoever stays ten days at one position stands still. What cannot: standing still does not
+    mind where one site ends and the next begins, so that some standstills are of two sites. For 225 days of 2008 the
+    path says nothing: a standstill ends there, and another begins.
+    """
+    stays = traverse.stays
+    ends = [_last_of([stay]) for stay in stays]
+    assert ends == sorted(ends)
+    assert max(later - end for end, later in pairwise(ends)) > rover_recognizers.LONGEST
+    expected: list[list[UUID]] = []
+    at = 0
+    while at < len(stays):
+        region = stays[at].region
+        assert region is not None
+        end = at + 1
+        while end < len(stays) and _covers(stays[end].region, region.polygon.centroid):
+            if ends[end] - ends[end - 1] > rover_recognizers.LONGEST:
+                break
+            end += 1
+        first = min(e.interval.begin for e in stays[at:end] if e.interval is not None)
+        if ends[end - 1] - first >= timedelta(days=10):
+            expected.append([stay.uid for stay in stays[at:end]])
+            at = end
+        else:
+            at += 1
+    found = list(watched.recall(cues.exactly("Standstill")))
+    assert [list(standstill.parts) for standstill in found] == expected
+    assert len(found) == 41
+    inside = {part: standstill for standstill in found for part in standstill.parts}
+    long = [stay for stay in stays if _lasted(stay) >= timedelta(days=10)]
+    assert len(long) > 10
+    assert all(stay.uid in inside for stay in long)
+    site_of = {stay.uid: stay.value("site") for stay in stays}
+    assert sum(len({site_of[part] for part in standstill.parts}) > 1 for standstill in found) == 15
+
+
+def _covers(region: Region | None, point: shapely.Point) -> bool:
+    return region is not None and bool(region.polygon.intersects(point))
+
+
+def test_a_replay_finds_the_same(watched: Memory) -> None:
+    again = watched.recognize(rover_recognizers.RECOGNIZERS, commit=False)
+    assert (again.new, again.missing, again.late) == ((), (), 0)
+    assert len(again.found) == 834 + 139 + 41
+
+
+def _lasted(event: Event) -> timedelta:
+    assert event.interval is not None
+    return event.interval.duration or timedelta()

@@ -14,7 +14,7 @@ from elm.storage.tables import event, part
 def kin(cue: KinCue) -> Rule:
     """The parts or wholes against a given set."""
     uids = (list(cue.uids), UIDS)
-    if cue.kin is Kin.PARTS and not cue.transitive and cue.relation in (SetRelation.EQUAL, SetRelation.SUPERSET):
+    if cue.kin is Kin.PARTS and not cue.transitive and cue.relation in _BY_ROW:
         return _own_parts(cue)
     key = (cue.kin.value, cue.relation.value, cue.transitive, bool(cue.uids))
     lines = _Lines(cue.kin, transitive=cue.transitive)
@@ -29,9 +29,9 @@ def kin(cue: KinCue) -> Rule:
             case SetRelation.SUPERSET:
                 return lines.has_all(e, p, given) if cue.uids else true()
             case SetRelation.SUBSET:
-                return not_(lines.has_other_than(e, p))
+                return not_(lines.has_other_than(e, p, given))
             case SetRelation.EQUAL if cue.uids:
-                return and_(lines.has_all(e, p, given), not_(lines.has_other_than(e, p)))
+                return and_(lines.has_all(e, p, given), not_(lines.has_other_than(e, p, given)))
             case SetRelation.EQUAL:
                 return not_(lines.has_any(e))
             case unknown:
@@ -46,8 +46,10 @@ def _own_parts(cue: KinCue) -> Rule:
 
     def build(e: FromClause, p: Bind, one: Bind) -> Condition:
         within = e.c.parts.op("<@", is_comparison=True)(p)
+        if cue.relation is SetRelation.SUBSET:
+            return within
         if not cue.uids:
-            return within if cue.relation is SetRelation.EQUAL else true()
+            return e.c.parts == p if cue.relation is SetRelation.EQUAL else true()
         wholes = select(part.c.whole_id).join(_other, _other.c.id == part.c.part_id).where(_other.c.uid == one)
         covers = and_(e.c.id == any_(func.array(wholes.scalar_subquery())), e.c.parts.op("@>", is_comparison=True)(p))
         return and_(covers, within) if cue.relation is SetRelation.EQUAL else covers
@@ -55,6 +57,7 @@ def _own_parts(cue: KinCue) -> Rule:
     return Rule((cue.kin.value, cue.relation.value, "own", bool(cue.uids)), values, build)
 
 
+_BY_ROW = (SetRelation.EQUAL, SetRelation.SUPERSET, SetRelation.SUBSET)
 _other = event.alias("other")
 
 
@@ -86,25 +89,25 @@ class _Lines:
         """Whether the event has any kin."""
         return exists(select(literal_column("1")).where(self._own == e.c.id).correlate(e))
 
-    def has_other_than(self, e: FromClause, uids: Bind) -> Condition:
-        """Whether the event has kin that is not among `uids`."""
+    def has_other_than(self, e: FromClause, uids: Bind, given: Any) -> Condition:
+        """Whether the event has kin that is not among `uids`, whose ids are `given`."""
         if not self._transitive:
+            # Only of wholes: an event's direct parts are judged by its own row.
             link = part.alias("link")
-            own, kin = link.c[self._own.name], link.c[self._kin.name]
-            met: Select[Any] = (
-                select(literal_column("1")).join_from(link, _other, _other.c.id == kin).where(own == e.c.id)
+            others: Select[Any] = select(literal_column("1")).where(
+                link.c.part_id == e.c.id, link.c.whole_uid != all_(uids)
             )
-        else:
-            seen = (
-                select(self._kin.label("id"))
-                .where(self._own == e.c.id)
-                .correlate(e)
-                .cte("seen", recursive=True, nesting=True)
-            )
-            step = part.alias("step")
-            seen = seen.union(select(step.c[self._kin.name]).join_from(step, seen, step.c[self._own.name] == seen.c.id))
-            met = select(literal_column("1")).join_from(seen, _other, _other.c.id == seen.c.id)
-        return exists(met.where(_other.c.uid != all_(uids)).correlate(e))
+            return exists(others.correlate(e))
+        seen = (
+            select(self._kin.label("id"))
+            .where(self._own == e.c.id)
+            .correlate(e)
+            .cte("seen", recursive=True, nesting=True)
+        )
+        step = part.alias("step")
+        seen = seen.union(select(step.c[self._kin.name]).join_from(step, seen, step.c[self._own.name] == seen.c.id))
+        known = func.array(given.scalar_subquery())
+        return exists(select(literal_column("1")).where(seen.c.id != all_(known)).correlate(e))
 
     def _reached(self, given: Any) -> Any:
         """Pairs (own_id, start_id): the event `own_id` has the given event `start_id` among its kin."""

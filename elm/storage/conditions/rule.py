@@ -31,6 +31,21 @@ class Rule:
     values: tuple[tuple[Any, TypeEngine[Any]], ...]
     build: Callable[..., Any]
     """Takes the table (or an alias of it) whose rows are judged, then one parameter for each value."""
+    search: Callable[..., Any] | None = None
+    """Likewise: what an index finds, all that match and perhaps others, if the planner can tell how many that are.
+
+    The same as `build` where it finds no others; None where no index serves.
+    """
+
+    @property
+    def is_search(self) -> bool:
+        """Whether an index finds exactly what matches."""
+        return self.search is self.build
+
+
+def indexed(key: tuple[Any, ...], values: tuple[tuple[Any, TypeEngine[Any]], ...], build: Callable[..., Any]) -> Rule:
+    """A condition that an index serves as it is."""
+    return Rule(key, values, build, build)
 
 
 TIME = TIMESTAMP(timezone=True)

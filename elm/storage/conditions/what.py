@@ -28,7 +28,7 @@ from sqlalchemy.types import TypeEngine
 from elm.cues.algebra import Comparison, FeatureCue, FeatureNamesCue, FeaturesCue, SetRelation
 from elm.features import ends_within, fold, kind_of, name_tokens, token, tokens, value_text
 from elm.storage.conditions.compare import COMPARE
-from elm.storage.conditions.rule import TEXTS, Bind, Condition, Rule
+from elm.storage.conditions.rule import TEXTS, Bind, Condition, Rule, indexed
 
 
 def feature_names(cue: FeatureNamesCue) -> Rule:
@@ -49,7 +49,7 @@ def features(cue: FeaturesCue) -> Rule:
     def build(e: FromClause, p: Bind, within: Bind) -> Condition:
         return and_(rule.build(e, p).is_(true()), e.c.feature_ends == any_(within))
 
-    return Rule((*rule.key, "by ends"), values, build)
+    return indexed((*rule.key, "by ends"), values, build)
 
 
 _MOST_ENDS = 50
@@ -75,7 +75,7 @@ def _text_set(op: str, relation: SetRelation, given: list[str], name: str) -> Ru
             case unknown:
                 assert_never(unknown)
 
-    return Rule((op, relation.value), values, build)
+    return Rule((op, relation.value), values, build, None if relation is SetRelation.DISJOINT else build)
 
 
 _JSON_KIND = {"b": "boolean", "n": "number", "s": "string"}
@@ -87,8 +87,11 @@ def feature(cue: FeatureCue) -> Rule:
     key = ("feature", cue.compare.value, kind)
     if cue.compare is Comparison.EQ:
         values: tuple[tuple[Any, TypeEngine[Any]], ...] = (([token((cue.name, cue.value))], TEXTS),)
-        return Rule(key, values, lambda e, p: e.c.feature_tokens.op("@>", is_comparison=True)(p))
+        return indexed(key, values, lambda e, p: e.c.feature_tokens.op("@>", is_comparison=True)(p))
     values = (([fold(cue.name)], TEXTS), (cue.name, Text()), (value_text(cue.value), Text()))
+
+    def search(e: FromClause, names: Bind, *_: Bind) -> Condition:
+        return e.c.feature_names.op("@>", is_comparison=True)(names)
 
     def build(e: FromClause, names: Bind, name: Bind, value: Bind) -> Condition:
         pair = func.json_array_elements(e.c.features).table_valued(column("value"), name="pair").render_derived()
@@ -102,8 +105,8 @@ def feature(cue: FeatureCue) -> Rule:
         # CASE, because AND does not promise to check the kind before it casts.
         holds = case((and_(named, right_kind), COMPARE[cue.compare](stored, given)), else_=false())
         return and_(
-            e.c.feature_names.op("@>", is_comparison=True)(names),
+            search(e, names),
             exists(select(literal_column("1")).select_from(pair).where(holds)),
         )
 
-    return Rule(key, values, build)
+    return Rule(key, values, build, search)

@@ -13,7 +13,7 @@ from sqlalchemy.types import TypeEngine
 from elm.cues.algebra import DurationCue, SetRelation, TimeAxis, TimeCue
 from elm.interval import AllenRelation
 from elm.storage.conditions.compare import COMPARE
-from elm.storage.conditions.rule import TIME, Bind, Condition, Rule
+from elm.storage.conditions.rule import TIME, Bind, Condition, Rule, indexed
 
 _MINUS_INFINITY: Bind = literal_column("'-infinity'::timestamptz")
 _PLUS_INFINITY: Bind = literal_column("'infinity'::timestamptz")
@@ -33,7 +33,7 @@ def time(cue: TimeCue) -> Rule:
             return _recorded(cue.relation, e.c.recorded_at, c, d)
         return _during(cue.relation, e.c.period, c, d)
 
-    return Rule(key, values, build)
+    return indexed(key, values, build)
 
 
 def _range(begin: Bind, end: Bind) -> ColumnElement[Any]:

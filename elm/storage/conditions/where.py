@@ -27,7 +27,9 @@ def region(cue: RegionCue, names: Names) -> Rule:
         given = func.ST_GeomFromWKB(wkb, type_=Geometry)
         return and_(e.c[frame_id] == frame, _spatial(cue.relation, e.c[geometry], given, *distance))
 
-    return Rule(("region", cue.place.value, cue.relation.value), values, build)
+    # Most of a frame is disjoint from a polygon: there is no index for that.
+    search = None if cue.relation is SpatialRelation.DISJOINT else build
+    return Rule(("region", cue.place.value, cue.relation.value), values, build, search)
 
 
 def _spatial(relation: SpatialRelation, here: ColumnElement[Any], given: Any, *distance: Bind) -> Any:

@@ -1,11 +1,12 @@
-"""Rows, laps and the session, found from a run's atomic events alone, as docs/glossary.md defines them."""
+"""An oracle of the mower's episodes: rows, laps and the session of a whole run, found all at once in its motions."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from itertools import takewhile
-from uuid import UUID
+from uuid import NAMESPACE_OID, UUID, uuid5
 
 from elm.event import Event
 from elm.features import FeatureValue
@@ -20,6 +21,27 @@ ROW_LENGTH = 5.0
 """Metres of driving that make a row."""
 
 Naming = Callable[[int], UUID]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Episodes:
+    """All episodes of one run."""
+
+    rows: tuple[Event, ...]
+    laps: tuple[Event, ...]
+    session: Event
+
+
+def episodes(motions: Sequence[Event], contacts: Sequence[Event], run: str) -> Episodes:
+    """The episodes among a run's motions in time order, and its contacts."""
+    found = tuple(rows(motions, lambda number: _uid(run, "row", number)))
+    rounds = tuple(laps(motions, found, lambda number: _uid(run, "lap", number)))
+    whole = session(motions, contacts, found, rounds, run, _uid(run, "session", 1))
+    return Episodes(rows=found, laps=rounds, session=whole)
+
+
+def _uid(run: str, kind: str, number: int) -> UUID:
+    return uuid5(NAMESPACE_OID, f"{run}/{kind}/{number}")
 
 
 def rows(motions: Sequence[Event], name: Naming) -> Iterator[Event]:
@@ -153,5 +175,5 @@ def _heading(drive: Event) -> float:
 
 def _number(event: Event, name: str) -> float:
     value = event.value(name)
-    assert isinstance(value, int | float)  # noqa: S101 - the loader gives every motion these features
+    assert isinstance(value, int | float)
     return value

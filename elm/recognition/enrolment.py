@@ -1,0 +1,78 @@
+"""Enrolment: seeing to types, definitions and who feeds whom before recognizers may work in a memory."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from elm.cues.codec import cue_from_json
+from elm.errors import DefinitionChanged, InvalidValue, UnknownType
+from elm.log import LoggedStore
+from elm.recognition.clocks import Timing
+from elm.recognition.strands import Strand, strands
+from elm.recognizers.base import Judge, Recognizer
+
+
+def enrolled(
+    store: LoggedStore, recognizers: Sequence[Recognizer], consumer: str, timing: Timing, judge: Judge
+) -> list[Strand]:
+    """The strands of recognizers that may work in a memory under a consumer's name.
+
+    The memory then has the types of their results and knows their definitions.
+    """
+    found = known_strands(store, recognizers, timing, judge)
+    refuse_changed(store, found)
+    _refuse_rings(store, recognizers, consumer, judge)
+    store.log.define(_definitions(found))
+    return found
+
+
+def known_strands(store: LoggedStore, recognizers: Sequence[Recognizer], timing: Timing, judge: Judge) -> list[Strand]:
+    """The strands of recognizers whose types the memory has; it is given those of their results."""
+    types = {output.name: output for recognizer in recognizers for output in recognizer.outputs}
+    if types:
+        store.add_types(list(types.values()))
+    for recognizer in recognizers:
+        try:
+            for output in recognizer.outputs:
+                judge.of_type(recognizer.interest, output.name)
+        except UnknownType as error:
+            raise UnknownType(f"recognizer {recognizer.name!r} looks for what cannot be: {error}") from error
+    return strands(recognizers, judge, timing)
+
+
+def _definitions(found: Sequence[Strand]) -> dict[str, str]:
+    return {
+        f"{recognizer.name} {recognizer.version}": fingerprint
+        for strand in found
+        for recognizer, fingerprint in zip(strand.recognizers, strand.fingerprints, strict=True)
+    }
+
+
+def refuse_changed(store: LoggedStore, found: Sequence[Strand]) -> None:
+    """Refuse recognizers that worked here under the same version with another definition."""
+    known = store.log.definitions()
+    for name, fingerprint in _definitions(found).items():
+        if known.get(name, fingerprint) != fingerprint:
+            recognizer, version = name.rsplit(" ", 1)
+            raise DefinitionChanged(
+                f"recognizer {recognizer!r} of version {version} was defined otherwise when it last worked in this "
+                f"memory: raise its version, so that its results can be told apart"
+            )
+
+
+def _refuse_rings(store: LoggedStore, recognizers: Sequence[Recognizer], consumer: str, judge: Judge) -> None:
+    """Recognizers that feed each other share a consumer: else what they find would depend on who is faster."""
+    for other in store.log.consumers():
+        owner = other.report.get("consumer")
+        if owner is None or owner == consumer:
+            continue
+        for told in other.report["recognizers"]:
+            interest = cue_from_json(told["interest"])
+            for mine in recognizers:
+                gives = any(judge.of_type(interest, output.name) is not False for output in mine.outputs)
+                takes = any(judge.of_type(mine.interest, name) is not False for name in told["outputs"])
+                if gives and takes:
+                    raise InvalidValue(
+                        f"recognizer {mine.name!r} and {told['name']!r} of consumer {owner!r} would feed each other: "
+                        f"let one consumer run both"
+                    )

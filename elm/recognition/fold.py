@@ -1,0 +1,376 @@
+"""The fold over the log: clocks, events held until their time has come, and the strands that are fed with them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from heapq import heappop, heappush
+from typing import Any
+from uuid import UUID
+
+from elm.event import StoredEvent
+from elm.interval import from_micros, to_micros
+from elm.log import LogEntry, LogKind, Tick
+from elm.recognition.bench import Bench, RecognizerFailure, Tally
+from elm.recognition.clocks import Clocks, Timing
+from elm.recognition.results import Result, moment_of
+from elm.recognition.strands import Strand
+from elm.recognizers.base import RECOGNIZER, Fed, Judge
+
+MOST_HELD = 200_000
+"""Events that wait for their time at once, for one agent; more are passed over, and counted."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Taken:
+    """What a stretch of the log brought about: results by strand, in the order of detection, and failures."""
+
+    results: tuple[tuple[str, Result], ...]
+    failures: tuple[tuple[str, RecognizerFailure], ...]
+
+
+class Work:
+    """One strand at work: a bench for each agent, one across agents, and what it counted."""
+
+    def __init__(self, strand: Strand, judge: Judge) -> None:
+        self.strand = strand
+        self.judge = judge
+        self.tally = Tally(strand)
+        self.benches: dict[str | None, Bench] = {}
+        self.across = Bench(strand, across=True, agent=None, judge=judge, tally=self.tally)
+        self.has_across = any(each.across_agents for each in strand.recognizers)
+        self._single = Bench(strand, across=False, agent=None, judge=judge, tally=self.tally)
+
+    def bench(self, agent: str | None) -> Bench:
+        """The bench of one agent."""
+        known = self.benches.get(agent)
+        if known is None:
+            known = Bench(self.strand, across=False, agent=agent, judge=self.judge, tally=self.tally)
+            self.benches[agent] = known
+        return known
+
+    def wants(self, type_name: str) -> bool:
+        """Whether a recognizer of single agents may want events of a type."""
+        return self._single.interested(type_name)
+
+    def wants_across(self, type_name: str) -> bool:
+        """Whether a recognizer across agents may."""
+        return self.across.interested(type_name)
+
+    def counts(self) -> dict[str, dict[str, int]]:
+        """What the processes count, summed over agents, by recognizer."""
+        found: dict[str, dict[str, int]] = {each.name: {} for each in self.strand.recognizers}
+        for bench in (*self.benches.values(), self.across):
+            for name, counted in bench.counts().items():
+                for what, number in counted.items():
+                    found[name][what] = found[name].get(what, 0) + number
+        return found
+
+
+_Queue = list[tuple[int, int, int, Fed]]
+"""A heap of events by moment, begin and uid."""
+
+
+class Waiting:
+    """The moments of all events that wait for one watermark, whoever wants them: so many may wait, no more."""
+
+    def __init__(self, moments: list[int]) -> None:
+        self.moments = moments
+
+    def has_room(self, moment: int, watermark: int) -> bool:
+        """Whether one more event may wait; those before the watermark wait no longer."""
+        moments = self.moments
+        while moments and moments[0] < watermark:
+            heappop(moments)
+        if len(moments) >= MOST_HELD:
+            return False
+        heappush(moments, moment)
+        return True
+
+
+class Fold:
+    """F(A(P), W(P)): what some strands find in the log up to a position.
+
+    A `complete` one feeds what came too late as well, each event in its place: nothing is fed before `finish`.
+    """
+
+    def __init__(self, works: Sequence[Work], timing: Timing, own: frozenset[str], *, complete: bool = False) -> None:
+        self.works = {each.strand.name: each for each in works}
+        self.clocks = Clocks(timing)
+        self._own = own
+        self._queues: dict[str | None, _Queue] = {}
+        self._shared: _Queue = []
+        self._waiting: dict[str | None, Waiting] = {}
+        self._waiting_across = Waiting([])
+        self._wants: dict[str, tuple[tuple[Work, ...], tuple[Work, ...]]] = {}
+        self._results: list[tuple[str, Result]] = []
+        self._failures: list[tuple[str, RecognizerFailure]] = []
+        self._moved: dict[str | None, None] = {}
+        self._has_across = any(each.has_across for each in works)
+        self._complete = complete
+
+    # Taking entries in
+
+    def take(self, entries: Iterable[LogEntry]) -> Taken:
+        """Take in entries; what is found does not depend on how they are divided into calls."""
+        for entry in entries:
+            self._take(entry)
+            self._moved[entry.agent] = None
+            if self._complete:
+                self.clocks.share()
+            elif self._has_across:
+                # Results of single agents must find recognizers across agents where these were before this entry.
+                self._settle()
+        if not self._complete:
+            self._settle()
+        return self._told()
+
+    def finish(self) -> Taken:
+        """Feed all that has come of age by now."""
+        self._moved.update(dict.fromkeys(self.clocks.agents))
+        self._settle()
+        return self._told()
+
+    def _told(self) -> Taken:
+        taken = Taken(results=tuple(self._results), failures=tuple(self._failures))
+        self._results, self._failures = [], []
+        failed = {name for name, _ in taken.failures}
+        return Taken(
+            results=tuple((name, result) for name, result in taken.results if name not in failed),
+            failures=taken.failures,
+        )
+
+    def _take(self, entry: LogEntry) -> None:
+        event = entry.event
+        if event is None or entry.kind not in (LogKind.COMMIT, LogKind.CLOSE):
+            self.clocks.tell(entry, None)
+            return
+        end = moment_of(event)
+        before, shared = self.clocks.watermark(entry.agent), self.clocks.shared
+        recognizer = event.value(RECOGNIZER)
+        self.clocks.tell(entry, end if recognizer is None else None)
+        if recognizer is None:
+            self._accept(entry.agent, event, end, before, shared)
+        elif recognizer not in self._own:
+            # Certain long after its end, perhaps: never late, and fed behind what has been fed.
+            self._accept(entry.agent, event, end, before, shared, is_result=True)
+
+    def _accept(
+        self, agent: str | None, event: StoredEvent, moment: int, before: int, shared: int, *, is_result: bool = False
+    ) -> None:
+        single, across = self._wanted(event.type)
+        if is_result and not self._complete:
+            # Certain long after its end, perhaps: never late, and fed behind what has been fed.
+            moment, moment_across = max(moment, before), max(moment, shared)
+        else:
+            moment_across = moment
+        if moment < before and not self._complete:
+            _count_late(single)
+        elif not self._has_room(self._waiting.setdefault(agent, Waiting([])), moment, before):
+            _count_passed_over(single)
+        elif single:
+            _push(self._queues.setdefault(agent, []), event, moment)
+        if not self._has_across:
+            return
+        if moment_across < shared and not self._complete:
+            _count_late(across)
+        elif not self._has_room(self._waiting_across, moment_across, shared):
+            _count_passed_over(across)
+        elif across:
+            _push(self._shared, event, moment_across)
+
+    def _has_room(self, waiting: Waiting, moment: int, watermark: int) -> bool:
+        return self._complete or waiting.has_room(moment, watermark)
+
+    def _wanted(self, type_name: str) -> tuple[tuple[Work, ...], tuple[Work, ...]]:
+        known = self._wants.get(type_name)
+        if known is None:
+            works = self.works.values()
+            single = tuple(each for each in works if each.wants(type_name))
+            across = tuple(each for each in works if each.wants_across(type_name))
+            known = self._wants[type_name] = (single, across)
+        return known
+
+    # Feeding what has come of age
+
+    def _settle(self) -> None:
+        for agent in self._moved:
+            self._settle_agent(agent)
+        self._moved.clear()
+        if not self._has_across:
+            return
+        watermark = self.clocks.share()
+        while self._shared and self._shared[0][0] < watermark:
+            fed = heappop(self._shared)[3]
+            for work in self._wanted(fed.event.type)[1]:
+                self._work(work, work.across, fed)
+        for work in list(self.works.values()):
+            self._pass_time(work, work.across, watermark)
+
+    def _settle_agent(self, agent: str | None) -> None:
+        watermark = self.clocks.watermark(agent)
+        queue = self._queues.get(agent)
+        while queue and queue[0][0] < watermark:
+            fed = heappop(queue)[3]
+            for work in self._wanted(fed.event.type)[0]:
+                if found := self._work(work, work.bench(agent), fed):
+                    self._share(found)
+        for work in list(self.works.values()):
+            bench = work.benches.get(agent)
+            if bench is not None:
+                self._share(self._pass_time(work, bench, watermark))
+
+    def _work(self, work: Work, bench: Bench, fed: Fed) -> list[Result]:
+        try:
+            found = bench.feed(fed)
+        except RecognizerFailure as failure:
+            self._fail(work, failure)
+            return []
+        if found:
+            self._results += [(work.strand.name, result) for result in found]
+        return found
+
+    def _pass_time(self, work: Work, bench: Bench, watermark: int) -> list[Result]:
+        try:
+            found = bench.pass_time(watermark)
+        except RecognizerFailure as failure:
+            self._fail(work, failure)
+            return []
+        if found:
+            self._results += [(work.strand.name, result) for result in found]
+        return found
+
+    def _share(self, found: Sequence[Result]) -> None:
+        """What was found of one agent is fed across agents too, not before what has been fed there."""
+        if not self._has_across:
+            return
+        for result in found:
+            event = result.fed.event
+            if self._wanted(event.type)[1]:
+                _push(
+                    self._shared,
+                    event,
+                    result.fed.moment if self._complete else max(result.fed.moment, self.clocks.shared),
+                )
+
+    def _fail(self, work: Work, failure: RecognizerFailure) -> None:
+        self._failures.append((work.strand.name, failure))
+        self.remove(work.strand.name)
+
+    def remove(self, name: str) -> Work | None:
+        """Let go of a strand."""
+        work = self.works.pop(name, None)
+        self._wants.clear()
+        self._has_across = any(each.has_across for each in self.works.values())
+        return work
+
+    # Time
+
+    def ticks(self, now: int) -> tuple[list[Tick], int | None]:
+        """The ticks that would make something certain if written `now`, and when the next one would be due."""
+        found: list[Tick] = []
+        later: list[int] = []
+        lateness = self.clocks.lateness
+        if self.clocks.timing.simulated:
+            return found, None
+        awake = self.clocks.awake()
+        for agent, clock in self.clocks.agents.items():
+            waiting = self._waits_for(agent) + (self._waits_across() if agent in awake else [])
+            waits = sorted(moment + lateness + 1 for moment in waiting if moment + lateness >= clock.time)
+            reach = clock.after(now)
+            due = [moment for moment in waits if moment <= reach]
+            if due:
+                found.append(Tick(agent=agent, deadline=from_micros(due[-1])))
+            if len(due) < len(waits):
+                later.append(now + waits[len(due)] - reach)
+        return found, min(later, default=None)
+
+    def _waits_for(self, agent: str | None) -> list[int]:
+        moments = [item[0] for item in self._queues.get(agent, ())]
+        for work in self.works.values():
+            bench = work.benches.get(agent)
+            if bench is not None and (deadline := bench.next_deadline()) is not None:
+                moments.append(deadline)
+        return moments
+
+    def _waits_across(self) -> list[int]:
+        deadlines = [work.across.next_deadline() for work in self.works.values() if work.has_across]
+        return [item[0] for item in self._shared] + [each for each in deadlines if each is not None]
+
+    # What is kept
+
+    def snapshot(self, name: str) -> tuple[Any, list[Fed]]:
+        """The state of one strand as plain JSON (clocks, what waits for it, its processes), and the events it names."""
+        work = self.works[name]
+        held: dict[UUID, Fed] = {}
+        queues = []
+        for agent, queue in self._queues.items():
+            waiting = [item[3] for item in sorted(queue) if work.wants(item[3].event.type)]
+            queues.append([agent, [[str(fed.event.uid), fed.moment] for fed in waiting]])
+            held |= {fed.event.uid: fed for fed in waiting}
+        shared = [item[3] for item in sorted(self._shared) if work.wants_across(item[3].event.type)]
+        held |= {fed.event.uid: fed for fed in shared}
+        benches = [[agent, bench.snapshot()] for agent, bench in work.benches.items()]
+        for bench in (*work.benches.values(), work.across):
+            held |= {fed.event.uid: fed for fed in bench.held()}
+        return {
+            "clocks": self.clocks.snapshot(),
+            "queues": queues,
+            "shared": [[str(fed.event.uid), fed.moment] for fed in shared],
+            "benches": benches,
+            "across": work.across.snapshot(),
+            "waiting": [[agent, each.moments] for agent, each in self._waiting.items() if each.moments],
+            "waiting_across": self._waiting_across.moments,
+            "tally": work.tally.snapshot(),
+        }, list(held.values())
+
+    def resume(self, name: str, told: Any, held: dict[str, Fed]) -> None:
+        """Have a strand, the only one here, in the state of which a snapshot was taken."""
+        work = self.works[name]
+        self.clocks = Clocks.resumed(self.clocks.timing, told["clocks"])
+        self._queues = {agent: [_item(held[uid], moment) for uid, moment in queue] for agent, queue in told["queues"]}
+        self._shared = [_item(held[uid], moment) for uid, moment in told["shared"]]
+        for agent, states in told["benches"]:
+            work.bench(agent).resume(states, held)
+        work.across.resume(told["across"], held)
+        self._waiting = {agent: Waiting(moments) for agent, moments in told["waiting"]}
+        self._waiting_across = Waiting(told["waiting_across"])
+        work.tally.resume(told["tally"])
+
+    def adopt(self, other: Fold) -> None:
+        """Take over the strands of a fold that is at the same position."""
+        self.works |= other.works
+        self._wants.clear()
+        if other._has_across:
+            self._has_across = True
+            self.clocks.shared = other.clocks.shared
+            self._waiting_across = other._waiting_across
+        for agent, queue in other._queues.items():
+            _merge(self._queues.setdefault(agent, []), queue)
+        _merge(self._shared, other._shared)
+
+
+def _push(queue: _Queue, event: StoredEvent, moment: int) -> None:
+    begin = to_micros(event.interval.begin)
+    heappush(queue, (moment, begin, event.uid.int, Fed(event=event, moment=moment, begin=begin)))
+
+
+def _item(fed: Fed, moment: int) -> tuple[int, int, int, Fed]:
+    return moment, fed.begin, fed.event.uid.int, Fed(event=fed.event, moment=moment, begin=fed.begin)
+
+
+def _merge(into: _Queue, queue: _Queue) -> None:
+    known = {item[2] for item in into}
+    for item in queue:
+        if item[2] not in known:
+            heappush(into, item)
+
+
+def _count_late(works: Iterable[Work]) -> None:
+    for work in works:
+        work.tally.late += 1
+
+
+def _count_passed_over(works: Iterable[Work]) -> None:
+    for work in works:
+        work.tally.passed_over += 1

@@ -1,0 +1,389 @@
+"""The RecognitionManager: reads the log, feeds recognizers, commits what they find together with how far it got."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from threading import Event as Signal
+from threading import Thread
+from typing import Self
+
+from elm.errors import (
+    ConflictingContent,
+    CycleRefused,
+    DatabaseUnreachable,
+    ExtentRefused,
+    InvalidValue,
+    PositionLost,
+    StoreClosed,
+    UnknownEvent,
+    UnknownType,
+)
+from elm.interval import to_micros
+from elm.log import LoggedStore, Step
+from elm.recognition import checkpoint
+from elm.recognition.clocks import Timing
+from elm.recognition.enrolment import enrolled
+from elm.recognition.fold import Fold, Work
+from elm.recognition.judging import TypeJudge
+from elm.recognition.results import Result
+from elm.recognition.status import Failures, RecognizerStatus, report_of, report_of_failure, status
+from elm.recognition.strands import Strand
+from elm.recognizers.base import Recognizer
+from elm.store import Arrival
+from elm.text import check_short_name
+
+BATCH = 2_000
+"""Entries of the log that are dealt with in one transaction."""
+POLL = 1.0
+"""Seconds after which the log is looked at again though nothing woke the manager."""
+NAP = 0.005
+"""Seconds between two looks at how far the thread is."""
+GLANCE = 0.02
+"""Seconds between two looks at a slow strand."""
+RETRY_FIRST, RETRY_MOST = 0.5, 60.0
+"""Seconds until a failed strand is tried again: doubled with every failure, up to the second."""
+SLOW = 1.0
+"""Seconds in one call from which a strand goes on in a thread of its own: others need not wait for it."""
+LARGE = 256 * 1024
+"""Bytes from which a checkpoint is not taken with every batch but with every `LARGE_EVERY`-th."""
+LARGE_EVERY = 16
+_REFUSALS = (ConflictingContent, CycleRefused, ExtentRefused, InvalidValue, UnknownEvent, UnknownType)
+"""What a memory says of results that cannot be kept."""
+
+log = logging.getLogger(__name__)
+
+
+class _Lane:
+    """Strands that are at one position of the log and go on together."""
+
+    def __init__(self, fold: Fold, position: int) -> None:
+        self.fold = fold
+        self.position = position
+        self.checkpoint_bytes: dict[str, int] = {}
+        self.batches = 0
+        self.at_once: int | None = None
+        """Entries of a batch, where a slow strand goes by itself: few, to be stopped and heard of soon."""
+        self.at_work: Future[int] | None = None
+
+    @property
+    def is_slow(self) -> bool:
+        """Whether the others do not wait for it."""
+        return self.at_once is not None
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether a thread is at it."""
+        return self.at_work is not None and not self.at_work.done()
+
+
+class RecognitionManager:
+    """Recognition in one memory by some recognizers, under one consumer's name (the paper's RecognitionManager).
+
+    `start()` and `stop()` have it work in a thread beside a writer; `run()` works until it is told to stop;
+    `catch_up()` deals with what the log holds and returns. What is found is committed in one transaction with
+    the position in the log: killed at any point, it goes on where it was and finds the same.
+    A recognizer that raises stops its own strand only (those that feed each other); it is tried again, and
+    `status()` says so. New recognizers begin behind position `since`.
+    """
+
+    def __init__(
+        self,
+        store: LoggedStore,
+        recognizers: Sequence[Recognizer],
+        *,
+        consumer: str = "recognition",
+        timing: Timing | None = None,
+        since: int = 0,
+        batch: int = BATCH,
+    ) -> None:
+        self.consumer = check_short_name(consumer, what="the name of a consumer")
+        self.timing = timing or Timing()
+        if isinstance(batch, bool) or not isinstance(batch, int) or batch < 1:
+            raise InvalidValue(f"a batch has at least one entry, not {batch!r}")
+        self._store = store
+        self._recognizers = tuple(recognizers)
+        self._since = since
+        self._batch = batch
+        self._judge = TypeJudge(store.types)
+        self._own = frozenset(each.name for each in recognizers)
+        self._strands: dict[str, Strand] = {}
+        self._lanes: list[_Lane] = []
+        self._retry_at: dict[str, float] = {}
+        self._failures: dict[str, Failures] = {}
+        self._pool: ThreadPoolExecutor | None = None
+        self._stop = Signal()
+        self._thread: Thread | None = None
+        self._broke: Exception | None = None
+
+    # Running
+
+    def catch_up(self, stop: Signal | None = None) -> int:
+        """Deal with all that the log holds by now, or until `stop` is set; how many entries that were.
+
+        Entries count once for each group of strands that goes by itself. No time passes meanwhile: what the last
+        entries leave waiting stays so.
+        """
+        with self._working():
+            done = 0
+            while not (stop is not None and stop.is_set()) and (step := self._round()):
+                done += step
+            return done
+
+    def run(self, stop: Signal | None = None) -> None:
+        """Deal with the log as it grows, until `stop` is set (or `stop()` called); outlives a server's restart."""
+        asked = stop or self._stop
+        pause = RETRY_FIRST
+        while not asked.is_set():
+            try:
+                with self._working(), ThreadPoolExecutor(thread_name_prefix=f"elm {self.consumer}") as self._pool:
+                    while not asked.is_set():
+                        if self._round() == 0:
+                            self._wait(asked)
+                        pause = RETRY_FIRST
+            except DatabaseUnreachable as error:
+                log.warning("recognition %r goes on when there is a server again: %s", self.consumer, error)
+                asked.wait(pause)
+                pause = min(2 * pause, RETRY_MOST)
+            finally:
+                self._pool = None
+
+    def start(self) -> None:
+        """Work in a thread of this process until `stop()`."""
+        if self._thread is not None:
+            raise InvalidValue("this manager is running already: stop it before starting it again")
+        self._stop.clear()
+        self._broke = None
+        self._enrol()
+        self._thread = Thread(target=self._run_guarded, name=f"elm {self.consumer}", daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End the thread after the batch it is at; what broke it, if something did, is raised here."""
+        self._stop.set()
+        if self._thread is not None:
+            self._thread.join()
+            self._thread = None
+        if self._broke is not None:
+            raise self._broke
+
+    def __enter__(self) -> Self:
+        self.start()
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        """Deal with what was committed until now, and stop."""
+        head = self._store.log.head()
+        while self._thread is not None and self._thread.is_alive() and self._is_behind(head):
+            time.sleep(NAP)
+        self.stop()
+
+    def _is_behind(self, head: int) -> bool:
+        told = self.status()
+        return not told or any(each.position < head and not each.is_failing for each in told)
+
+    def status(self) -> list[RecognizerStatus]:
+        """How each of the recognizers is doing, as last committed."""
+        return status(self._store.log, self.consumer)
+
+    def _run_guarded(self) -> None:
+        try:
+            self.run(self._stop)
+        except StoreClosed:
+            log.info("recognition %r ends: the memory was closed", self.consumer)
+        except Exception as error:
+            log.exception("recognition %r stopped", self.consumer)
+            self._broke = error
+
+    def _enrol(self) -> None:
+        if not self._strands:
+            found = enrolled(self._store, self._recognizers, self.consumer, self.timing, self._judge)
+            self._strands = {each.name: each for each in found}
+
+    @contextmanager
+    def _working(self) -> Iterator[None]:
+        self._enrol()
+        with self._store.log.exclusive(self.consumer):
+            self._lanes, self._retry_at = [], {}
+            self._open()
+            yield
+
+    # Where strands stand
+
+    def _open(self) -> None:
+        """Register a consumer for each strand, forget those of strands that are no more, and restore states."""
+        names = {self._named(strand) for strand in self._strands}
+        for known in self._store.log.consumers():
+            if known.report.get("consumer") == self.consumer and known.name not in names:
+                log.info("%r is not among the recognizers any more: it is forgotten", known.name)
+                self._store.log.remove(known.name)
+        for strand in self._strands.values():
+            known = self._store.log.register(self._named(strand.name), position=self._since)
+            if not known.report:
+                work = Work(strand, self._judge)
+                report = report_of(work, self.consumer, Fold([work], self.timing, self._own).clocks, None)
+                step = Step(name=known.name, before=known.position, position=known.position, report=report)
+                self._store.log.advance([step])
+            self._enter(strand)
+        self._join_lanes()
+
+    def _named(self, strand: str) -> str:
+        return f"{self.consumer}/{strand}"
+
+    def _enter(self, strand: Strand) -> _Lane | None:
+        """A lane with a strand as its consumer was left: its checkpoint, and what the log held since, fed again."""
+        consumer = self._store.log.consumer(self._named(strand.name))
+        if consumer is None:
+            raise PositionLost(f"consumer {self._named(strand.name)!r} was removed while it was at work: start again")
+        fold = Fold([Work(strand, self._judge)], self.timing, self._own)
+        at = consumer.checkpoint
+        if consumer.state is not None:
+            checkpoint.restored(fold, strand.name, consumer.state, self._store.get)
+        while at < consumer.position:
+            entries = self._store.log.read(at, min(self._batch, consumer.position - at))
+            taken = fold.take(entries)
+            if taken.failures:
+                self._fail(strand, taken.failures[0][1])
+                return None
+            at = entries[-1].position
+        self._lanes.append(_Lane(fold, at))
+        return self._lanes[-1]
+
+    def _join_lanes(self) -> None:
+        """Strands that have come to one position go on together, but for slow ones."""
+        first: dict[int, _Lane] = {}
+        for lane in [*self._lanes]:
+            if lane.is_slow:
+                continue
+            known = first.setdefault(lane.position, lane)
+            if known is not lane:
+                known.fold.adopt(lane.fold)
+                known.checkpoint_bytes |= lane.checkpoint_bytes
+                self._lanes.remove(lane)
+
+    # Working
+
+    def _round(self) -> int:
+        """One batch for every lane; how many entries were dealt with."""
+        self._retry()
+        head = self._store.log.head()
+        done = 0
+        for lane in [*self._lanes]:
+            if lane.position >= head or lane.is_busy:
+                continue
+            if lane.at_work is not None:
+                lane.at_work.result()
+            if lane.is_slow and self._pool is not None:
+                lane.at_work = self._pool.submit(self._advance, lane)
+            else:
+                done += self._advance(lane)
+        self._join_lanes()
+        return done
+
+    def _advance(self, lane: _Lane) -> int:
+        entries = self._store.log.read(lane.position, lane.at_once or self._batch)
+        if not entries:
+            return 0
+        taken = lane.fold.take(entries)
+        for name, failure in taken.failures:
+            self._fail(self._strands[name], failure)
+        if lane.fold.works:
+            self._commit(lane, entries[-1].position, taken.results)
+        else:
+            self._lanes.remove(lane)
+        return len(entries)
+
+    def _commit(self, lane: _Lane, position: int, results: Sequence[tuple[str, Result]]) -> None:
+        lane.batches += 1
+        steps = [self._step(lane, name, position) for name in lane.fold.works]
+        arrivals = [Arrival(event=event) for _, result in results for event in result.events]
+        try:
+            self._store.log.advance(steps, arrivals)
+        except _REFUSALS as error:
+            self._lanes.remove(lane)
+            if len(steps) == 1:
+                (name,) = lane.fold.works
+                self._fail(self._strands[name], error)
+                return
+            # One of them found what cannot be kept: each by itself now, so that the others are not held up.
+            for name in [*lane.fold.works]:
+                own = self._enter(self._strands[name])
+                if own is not None:
+                    self._advance(own)
+            return
+        lane.position = position
+        self._set_slow_aside(lane)
+
+    def _step(self, lane: _Lane, name: str, position: int) -> Step:
+        work = lane.fold.works[name]
+        state = None
+        if lane.checkpoint_bytes.get(name, 0) < LARGE or lane.batches % LARGE_EVERY == 0:
+            state = checkpoint.taken(lane.fold, name)
+            lane.checkpoint_bytes[name] = len(state)
+        report = report_of(work, self.consumer, lane.fold.clocks, self._failures.get(name))
+        return Step(name=self._named(name), before=lane.position, position=position, state=state, report=report)
+
+    def _set_slow_aside(self, lane: _Lane) -> None:
+        """Have a strand that was slow go by itself, entry by entry at first; one that is no more joins the others."""
+        slow = [name for name, work in lane.fold.works.items() if work.tally.longest_call() > SLOW]
+        if lane.at_once is not None:
+            lane.at_once = 1 if slow else 2 * lane.at_once
+            if lane.at_once >= self._batch:
+                lane.at_once = None
+            return
+        for name in slow:
+            log.warning("recognition %r: %r took over %g s in one call: it is set aside", self.consumer, name, SLOW)
+            own: _Lane | None = lane
+            if len(lane.fold.works) > 1:
+                lane.fold.remove(name)
+                own = self._enter(self._strands[name])
+            if own is not None:
+                own.at_once = 1
+
+    # Failing
+
+    def _fail(self, strand: Strand, error: Exception) -> None:
+        known = self._failures.get(strand.name)
+        failures = Failures(count=known.count + 1 if known else 1, error=f"{error}")
+        self._failures[strand.name] = failures
+        self._retry_at[strand.name] = time.monotonic() + min(RETRY_FIRST * 2 ** min(failures.count - 1, 10), RETRY_MOST)
+        log.warning("recognition %r: %r failed (%d): %s", self.consumer, strand.name, failures.count, error)
+        consumer = self._store.log.consumer(self._named(strand.name))
+        if consumer is not None:
+            report = report_of_failure(consumer.report, failures)
+            at = consumer.position
+            self._store.log.advance([Step(name=consumer.name, before=at, position=at, report=report)])
+
+    def _retry(self) -> None:
+        for name, due in [*self._retry_at.items()]:
+            if time.monotonic() >= due:
+                del self._retry_at[name]
+                self._enter(self._strands[name])
+
+    # Waiting
+
+    def _wait(self, asked: Signal) -> None:
+        """Wait for entries, for the time at which something is certain, or until a strand is to be tried again."""
+        now = to_micros(datetime.now(UTC))
+        seconds = POLL
+        idle = [lane for lane in self._lanes if not lane.is_busy]
+        for lane in idle:
+            ticks, later = lane.fold.ticks(now)
+            if ticks:
+                self._store.log.write(ticks)
+                return
+            if later is not None:
+                seconds = min(seconds, max(0.0, (later - now) / 1e6))
+        for due in self._retry_at.values():
+            seconds = min(seconds, max(0.0, due - time.monotonic()))
+        if len(idle) < len(self._lanes):
+            # A slow strand that is through with its entries wants more.
+            seconds = min(seconds, GLANCE)
+        if idle and not asked.is_set():
+            self._store.log.wait(min(lane.position for lane in idle), seconds)
+        else:
+            asked.wait(min(seconds, GLANCE))

@@ -1,0 +1,100 @@
+"""Replay (the paper's R*): what recognizers find in the log as it stands, to be committed or compared."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from uuid import UUID
+
+from elm.cues.algebra import FeaturesCue, Not, SetRelation, TypeCue, TypeRelation, UidCue
+from elm.errors import InvalidValue
+from elm.event import Event
+from elm.log import LoggedStore
+from elm.recognition.clocks import Timing
+from elm.recognition.enrolment import known_strands, refuse_changed
+from elm.recognition.fold import Fold, Taken, Work
+from elm.recognition.judging import TypeJudge
+from elm.recognition.manager import BATCH
+from elm.recognizers.base import DEADLINE, RECOGNIZER, VERSION, Recognizer
+from elm.store import Arrival, Query
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Replay:
+    """What a replay of the log found: complex events by uid, how many of them the memory did not have, and lag.
+
+    `missing` are results of these recognizers that the memory has and the replay lacks: found live where late
+    events were not known, or by what came before the position it began at. `late` events were not fed.
+    """
+
+    entries: int
+    found: tuple[UUID, ...]
+    new: tuple[UUID, ...]
+    missing: tuple[UUID, ...]
+    late: int
+
+
+def replay(
+    store: LoggedStore,
+    recognizers: Sequence[Recognizer],
+    *,
+    since: int = 0,
+    complete: bool = False,
+    timing: Timing | None = None,
+    commit: bool = True,
+) -> Replay:
+    """Feed the log behind position `since` to recognizers that have seen nothing, and commit what they find.
+
+    From the beginning, results equal those of a live run with the same `timing`; from a later position they do
+    where nothing was unfinished there. A `complete` replay feeds what came too late as well, and holds all events
+    that the recognizers want in this process. With `commit=False` nothing is written but the types of the results.
+    """
+    timing = timing or Timing()
+    judge = TypeJudge(store.types)
+    strands = known_strands(store, recognizers, timing, judge)
+    if commit:
+        refuse_changed(store, strands)
+    works = [Work(strand, judge) for strand in strands]
+    fold = Fold(works, timing, frozenset(each.name for each in recognizers), complete=complete)
+    head, position = store.log.head(), since
+    found: list[UUID] = []
+    new: list[UUID] = []
+    while position < head:
+        entries = store.log.read(position, min(BATCH, head - position))
+        position = entries[-1].position
+        _keep(store, fold.take(entries), found, new, commit=commit)
+    _keep(store, fold.finish(), found, new, commit=commit)
+    known = set(found)
+    missing = [uid for uid in _live(store, recognizers) if uid not in known]
+    return Replay(
+        entries=max(0, head - since),
+        found=tuple(found),
+        new=tuple(new),
+        missing=tuple(missing),
+        late=sum(work.tally.late for work in works),
+    )
+
+
+def _keep(store: LoggedStore, taken: Taken, found: list[UUID], new: list[UUID], *, commit: bool) -> None:
+    for _, failure in taken.failures:
+        raise InvalidValue(f"the replay ended, for a recognizer failed: {failure}") from failure.__cause__
+    wholes = [result.events[-1] for _, result in taken.results]
+    found += [each.uid for each in wholes]
+    if not commit:
+        new += [each.uid for each in wholes if not store.exists(UidCue(uids=(each.uid,)))]
+        return
+    events: list[Event] = [event for _, result in taken.results for event in result.events]
+    fresh = {each.uid for each in store.commit_all([Arrival(event=event) for event in events]) if each.new}
+    new += [each.uid for each in wholes if each.uid in fresh]
+
+
+def _live(store: LoggedStore, recognizers: Sequence[Recognizer]) -> Iterator[UUID]:
+    """The results of these recognizers that the memory has."""
+    for recognizer in recognizers:
+        marks = ((RECOGNIZER, recognizer.name), (VERSION, recognizer.version))
+        of_it = FeaturesCue(relation=SetRelation.SUPERSET, features=marks)
+        no_deadline = Not(arg=TypeCue(relation=TypeRelation.EXACTLY, type=DEADLINE.name))
+        has_deadlines = any(output.name == DEADLINE.name for output in recognizer.outputs)
+        cue = of_it & no_deadline if has_deadlines else of_it
+        for event in store.find(Query(cue=cue)):
+            yield event.uid

@@ -1,0 +1,254 @@
+"""What ready-made recognizers share: definitions by groups of events, and processes that hold each until a time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime, timedelta
+from typing import Any, ClassVar, Generic, Self, TypeVar
+
+from elm.cues.algebra import Cue
+from elm.errors import InvalidValue
+from elm.event import StoredEvent
+from elm.features import Feature
+from elm.interval import to_micros
+from elm.recognizers.base import Emission, Fed, Judge, check_identity
+from elm.recognizers.elements import MOST_TAKEN, check_duration
+from elm.recognizers.measures import Measure
+from elm.recognizers.partition import Key, keys_of
+from elm.recognizers.purity import check_pure
+from elm.recognizers.spelling import plain
+from elm.taxonomy import EventType
+from elm.text import check_name, check_short_name
+
+MOST_GROUPS = 10_000
+"""Groups that one process holds, unless its definition says otherwise."""
+MOST_PARTS = MOST_TAKEN
+"""Events that one result is made of, unless its definition says otherwise."""
+MOST_COUNT = 1_000_000
+"""Greatest bound that a definition may set itself."""
+EVENT = "event"
+"""The step of parts that all play the same role."""
+
+_MICROSECOND = timedelta(microseconds=1)
+_LATEST = to_micros(datetime.max.replace(tzinfo=UTC))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Grouped:
+    """A recognizer that looks at groups of events, each by itself: those with the same values of some features.
+
+    `type` is the event type of its results, `parents` what that is a kind of; `partition` names the features.
+    """
+
+    STEPS: ClassVar[tuple[str, ...]] = (EVENT,)
+
+    name: str
+    version: int
+    type: str
+    parents: Sequence[str] = ()
+    partition: Sequence[str] = ()
+    across_agents: bool = False
+    measures: Mapping[str, Measure] = field(default_factory=dict)
+    most_groups: int = MOST_GROUPS
+
+    def __post_init__(self) -> None:
+        check_identity(self.name, self.version)
+        self._check_types(self.type)
+        keep_names(self, "partition", what=f"the partition of {self.title}")
+        if isinstance(self.parents, str):
+            raise InvalidValue(f"the parents of the types of {self.title} are several names: [{self.parents!r}]")
+        object.__setattr__(self, "parents", EventType(name=self.type, parents=tuple(self.parents)).parents)
+        object.__setattr__(self, "measures", dict(self.measures))
+        for name, measure in self.measures.items():
+            check_name(name, what=f"a measure of {self.title}")
+            if not isinstance(measure, Measure):
+                raise InvalidValue(f"{self.title} measures by count(), mean(...) and the like, not by {measure!r:.80}")
+            if measure.step is not None and measure.step not in self.STEPS:
+                steps = ", ".join(map(repr, self.STEPS))
+                raise InvalidValue(f"{self.title} measures step {measure.step!r}; its steps are {steps}")
+        self._check_count("most_groups")
+
+    @property
+    def title(self) -> str:
+        """How messages name it."""
+        return f"{type(self).__name__} {self.name!r}"
+
+    @property
+    def definition(self) -> Any:
+        """All that its results depend on, as plain JSON."""
+        return plain(self)
+
+    def measured(self, parts: Sequence[tuple[str, StoredEvent]]) -> tuple[Feature, ...]:
+        """The features of a result of these parts, by name."""
+        found = []
+        for name, measure in sorted(self.measures.items()):
+            value = measure.of([part for step, part in parts if measure.step in (None, step)])
+            if value is not None:
+                found.append((name, value))
+        return tuple(found)
+
+    def _types(self, *names: str | None) -> tuple[EventType, ...]:
+        found = dict.fromkeys(name for name in (self.type, *names) if name is not None)
+        return tuple(EventType(name=name, parents=tuple(self.parents)) for name in found)
+
+    def _check_types(self, *names: str | None) -> None:
+        for name in names:
+            if name is not None:
+                check_short_name(name, what=f"a type of {self.title}")
+
+    def _check_cues(self, *cues: Cue) -> None:
+        for cue in cues:
+            if not isinstance(cue, Cue):
+                raise InvalidValue(f"{self.title} needs a cue (elm.cues), not {cue!r:.80}")
+            check_pure(cue, what=self.title)
+
+    def _check_durations(self, *fields: str) -> None:
+        for name in fields:
+            check_duration(getattr(self, name), what=f"{name!r} of {self.title}")
+
+    def _check_count(self, name: str, *, least: int = 1) -> None:
+        count = getattr(self, name)
+        if isinstance(count, bool) or not isinstance(count, int) or not least <= count <= MOST_COUNT:
+            raise InvalidValue(
+                f"{name!r} of {self.title} is a number from {least:,} to {MOST_COUNT:,}, not {count!r:.80}"
+            )
+
+    def _reserve(self, feature: str) -> None:
+        if feature in self.measures:
+            raise InvalidValue(f"the feature {feature!r} of {self.title} is no measure: give the measure another name")
+
+
+def keep_names(definition: object, field_name: str, *, what: str) -> None:
+    """Keep a definition's feature names as a tuple of them, each once."""
+    given = getattr(definition, field_name)
+    if isinstance(given, str):
+        raise InvalidValue(f"{what} is several feature names: [{given!r}]")
+    names = dict.fromkeys(check_name(name, what=f"a feature of {what}") for name in given)
+    object.__setattr__(definition, field_name, tuple(names))
+
+
+def micros_of(duration: timedelta) -> int:
+    """A duration in microseconds, exactly."""
+    return duration // _MICROSECOND
+
+
+def later(moment: int, micros: int) -> int:
+    """`micros` after a moment, but no later than a datetime can say: time never passes beyond that."""
+    return min(moment + micros, _LATEST)
+
+
+@dataclass(slots=True)
+class Group:
+    """Events that one key holds until a moment; `tag` tells apart what a process holds under one key."""
+
+    key: Key
+    tag: tuple[str, ...]
+    deadline: int
+    held: list[Fed]
+
+
+Definition = TypeVar("Definition", bound=Grouped)
+
+
+class GroupedProcess(Generic[Definition]):
+    """A `Process` that holds groups of events in the order of their deadlines.
+
+    Subclasses say what an event does to the groups of a key and what the end of a group's time brings. A group
+    is put behind all others: its deadline must not be before theirs, as is so when it lies a constant time after
+    the moment at hand.
+    """
+
+    def __init__(self, definition: Definition, around: Judge) -> None:
+        self._definition = definition
+        self._around = around
+        self._partition = tuple(definition.partition)
+        self._groups: dict[tuple[Key, tuple[str, ...]], Group] = {}
+        self._dropped = 0
+        self._split = 0
+
+    @classmethod
+    def resumed(cls, definition: Definition, around: Judge, snapshot: Any, held: Mapping[str, Fed]) -> Self:
+        """The process of which `snapshot` was taken."""
+        process = cls(definition, around)
+        process._dropped, process._split = snapshot["dropped"], snapshot["split"]
+        for told in snapshot["groups"]:
+            key = tuple((kind, value) for kind, value in told["key"])
+            process._put(Group(key, tuple(told["tag"]), told["deadline"], [held[uid] for uid in told["held"]]))
+        return process
+
+    def feed(self, fed: Fed) -> Sequence[Emission]:
+        """Take in an event, in each of its groups."""
+        found: list[Emission] = []
+        for key in keys_of(fed.event, self._partition):
+            found += self._take(key, fed)
+        return found or ()
+
+    def deadline(self) -> int | None:
+        """The moment at which the first group's time is over."""
+        for group in self._groups.values():
+            return group.deadline
+        return None
+
+    def expire(self, moment: int) -> Sequence[Emission]:
+        """Time has passed beyond `moment`: the groups whose time is over, first ones first."""
+        found: list[Emission] = []
+        while (deadline := self.deadline()) is not None and deadline <= moment:
+            group = next(iter(self._groups.values()))
+            self._remove(group)
+            found += self._over(group)
+        return found
+
+    def snapshot(self) -> Any:
+        """The state as plain JSON."""
+        groups = [
+            {
+                "key": [list(pair) for pair in group.key],
+                "tag": list(group.tag),
+                "deadline": group.deadline,
+                "held": [str(fed.event.uid) for fed in group.held],
+            }
+            for group in self._groups.values()
+        ]
+        return {"groups": groups, "dropped": self._dropped, "split": self._split}
+
+    def held(self) -> Sequence[Fed]:
+        """The events of all groups, each once."""
+        return list({fed.event.uid: fed for group in self._groups.values() for fed in group.held}.values())
+
+    def counts(self) -> Mapping[str, int]:
+        """Groups that hold events, what was dropped, and how often an episode was cut in two at its bound."""
+        partial = sum(1 for group in self._groups.values() if group.held)
+        return {"partial": partial, "dropped": self._dropped, "split": self._split}
+
+    def _take(self, key: Key, fed: Fed) -> Sequence[Emission]:
+        """What an event does to the groups of a key."""
+        raise NotImplementedError
+
+    def _over(self, group: Group) -> Sequence[Emission]:
+        """What follows when the time of a group, which is no longer held, is over."""
+        raise NotImplementedError
+
+    def _find(self, key: Key, *tag: str) -> Group | None:
+        return self._groups.get((key, tag))
+
+    def _put(self, group: Group) -> None:
+        """Hold a group, behind all others; beyond the bound the one whose time is over first is dropped."""
+        self._groups.pop((group.key, group.tag), None)
+        self._groups[group.key, group.tag] = group
+        if len(self._groups) > self._definition.most_groups:
+            self._remove(next(iter(self._groups.values())))
+            self._dropped += 1
+
+    def _remove(self, group: Group) -> None:
+        del self._groups[group.key, group.tag]
+
+
+def span_of(held: Sequence[Fed]) -> int:
+    """From the least begin to the greatest end of events, in microseconds: the duration of what they make up."""
+    return max(fed.event.interval.micros[1] for fed in held) - min(fed.begin for fed in held)
+
+
+def alike(held: Sequence[Fed]) -> tuple[tuple[str, StoredEvent], ...]:
+    """Events as parts that all play the same role."""
+    return tuple((EVENT, fed.event) for fed in held)

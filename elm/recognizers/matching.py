@@ -1,0 +1,478 @@
+"""The engine of patterns: runs that take events, divide, end and time out, as docs/recognition.md says."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from heapq import heappop, heappush
+from typing import Any, Self
+from uuid import UUID
+
+from elm.cues.algebra import Cue
+from elm.event import StoredEvent
+from elm.features import Feature, FeatureValue
+from elm.interval import from_micros
+from elm.recognizers.base import Emission, Fed, Judge
+from elm.recognizers.measures import Measure
+from elm.recognizers.partition import Key, keys_of, values_of
+from elm.recognizers.plan import Plan, Target
+
+MATCH, TIMED_OUT = "match", "timed out"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rules:
+    """What a process needs to know of its pattern beside the plan; times in microseconds."""
+
+    type: str
+    timed_out: str | None
+    within: int
+    among: Cue | None
+    partition: tuple[str, ...]
+    bars_overlaps: bool
+    bars_same_start: bool
+    measures: Mapping[str, Measure]
+    most_runs: int
+
+
+_Taken = tuple["_Taken | None", int, Fed, int]
+"""What a run took, last first: what it took before, the step, the event, and the event's place in the partition."""
+
+
+class _Run:
+    """One way to take events: where it stands, what it took, and what has been closed to it since."""
+
+    __slots__ = ("alive", "begin", "closed", "count", "deadline", "key", "last", "passed", "serial", "start", "taken")
+
+    def __init__(self, serial: int, key: Key, start: int, taken: _Taken, count: int, begin: int, last: int) -> None:
+        self.serial = serial
+        self.key = key
+        self.start = start
+        self.taken = taken
+        self.count = count
+        self.begin = begin
+        self.last = last
+        self.closed: frozenset[int] = _NOTHING
+        """Negations, and the absence, that an event met since the last one taken."""
+        self.passed = False
+        """Whether an event was passed over since the last one taken."""
+        self.deadline: int | None = None
+        self.alive = True
+
+    def rank(self) -> tuple[list[int], list[int], Key]:
+        """What comes first of two that become certain at once: the places of its events, then its steps."""
+        trail = self.trail()
+        return [each[3] for each in trail], [each[1] for each in trail], self.key
+
+    def trail(self) -> list[_Taken]:
+        """What was taken, first first."""
+        found: list[_Taken] = []
+        each: _Taken | None = self.taken
+        while each is not None:
+            found.append(each)
+            each = each[0]
+        found.reverse()
+        return found
+
+
+_NOTHING: frozenset[int] = frozenset()
+
+
+class Matching:
+    """A pattern at work: its unfinished runs by partition, and their deadlines. A `Process`."""
+
+    def __init__(self, rules: Rules, plan: Plan, around: Judge) -> None:
+        self._rules = rules
+        self._plan = plan
+        self._around = around
+        self._runs: dict[Key, list[_Run]] = {}
+        self._timers: list[tuple[int, int, _Run]] = []
+        self._place = 0
+        self._serial = 0
+        self._pushed = 0
+        self._held = 0
+        self._has_ended = False
+        """Whether a run has ended since the event at hand came in."""
+        self._dropped = 0
+        self._by_type: dict[str, tuple[bool | None, ...] | None] = {}
+
+    # What comes in
+
+    def feed(self, fed: Fed) -> Sequence[Emission]:
+        """Take in an event; those that matched because of it."""
+        event = fed.event
+        try:
+            statics = self._by_type[event.type]
+        except KeyError:
+            statics = self._by_type[event.type] = self._statics(event.type)
+        if statics is None:
+            return ()
+        among = self._rules.among
+        if among is not None and not self._around.matches(among, event):
+            return ()
+        self._place += 1
+        hits = _Hits(self._plan, self._around, fed, statics)
+        found: list[Emission] = []
+        for key in keys_of(event, self._rules.partition):
+            found += self._feed_one(key, fed, hits)
+        if self._held > self._rules.most_runs:
+            self._drop()
+        return found
+
+    def _statics(self, type_name: str) -> tuple[bool | None, ...] | None:
+        """Of each atom whether events of the type match its cue; None when no event of it can change anything."""
+        statics = tuple(self._around.of_type(atom.cue, type_name) for atom in self._plan.atoms)
+        if not self._plan.has_strict and all(each is False for each in statics):
+            return None
+        return statics
+
+    def _feed_one(self, key: Key, fed: Fed, hits: _Hits) -> list[Emission]:
+        certain: list[_Run] = []
+        self._has_ended = False
+        runs = self._runs.get(key)
+        if runs is not None:
+            for run in runs[:]:
+                self._offer(run, fed, hits, certain)
+        if hits.of(0) and fed.moment - fed.begin <= self._rules.within and hits.holds(0, None):
+            self._serial += 1
+            taken: _Taken = (None, 0, fed, self._place)
+            self._begin(_Run(self._serial, key, self._place, taken, 1, fed.begin, fed.moment), certain)
+        if not certain and not self._has_ended:
+            return []
+        found = self._decided(certain, fed.moment)
+        self._clear(key)
+        return found
+
+    def _offer(self, run: _Run, fed: Fed, hits: _Hits, certain: list[_Run]) -> None:
+        """Have a run take the event, divide, or pass over it."""
+        targets = self._plan.targets(run.taken[1], run.count)
+        first = None
+        for target in targets:
+            # Most runs wait for another kind of event.
+            if hits.of(target.step) and self._is_possible(run, target, fed, hits):
+                first = target
+                break
+        if first is None:
+            self._pass_over(run, targets, hits, certain)
+        elif not first.divides:
+            self._take(run, first, fed, certain)
+        else:
+            for target in targets:
+                if self._is_possible(run, target, fed, hits):
+                    self._serial += 1
+                    other = _Run(self._serial, run.key, run.start, run.taken, run.count, run.begin, run.last)
+                    self._runs[run.key].append(other)
+                    self._held += 1
+                    self._take(other, target, fed, certain)
+            self._pass_over(run, targets, hits, certain)
+
+    def _targets(self, run: _Run) -> tuple[Target, ...]:
+        return self._plan.targets(run.taken[1], run.count)
+
+    def _is_possible(self, run: _Run, target: Target, fed: Fed, hits: _Hits) -> bool:
+        if not hits.of(target.step) or (target.strict and run.passed):
+            return False
+        if fed.moment - min(run.begin, fed.begin) > self._rules.within:
+            return False
+        if target.gap is not None and fed.moment - run.last > target.gap:
+            return False
+        if run.closed and not run.closed.isdisjoint(target.guards):
+            return False
+        return hits.holds(target.step, run.taken)
+
+    def _begin(self, run: _Run, certain: list[_Run]) -> None:
+        self._runs.setdefault(run.key, []).append(run)
+        self._held += 1
+        self._go_on(run, certain)
+
+    def _take(self, run: _Run, target: Target, fed: Fed, certain: list[_Run]) -> None:
+        run.count = run.count + 1 if target.step == run.taken[1] else 1
+        run.taken = (run.taken, target.step, fed, self._place)
+        run.begin = min(run.begin, fed.begin)
+        run.last = fed.moment
+        run.closed = _NOTHING
+        run.passed = False
+        self._go_on(run, certain)
+
+    def _go_on(self, run: _Run, certain: list[_Run]) -> None:
+        """What follows from an event just taken: a match, and until when the run waits."""
+        targets = self._targets(run)
+        if self._is_accepting(run) and self._plan.absent is None and (not targets or targets[0].divides):
+            # A copy stands for the match; the run itself goes on, if it can.
+            certain.append(self._copy(run))
+            if not targets:
+                self._end(run)
+                return
+        self._set_deadline(run, targets)
+
+    def _pass_over(self, run: _Run, targets: tuple[Target, ...], hits: _Hits, certain: list[_Run]) -> None:
+        run.passed = True
+        plan, step = self._plan, run.taken[1]
+        met = [g for g in plan.guards_behind[step] if g not in run.closed and hits.of(g) and hits.holds(g, run.taken)]
+        absent = plan.absent
+        waits = absent is not None and absent not in run.closed and self._is_accepting(run)
+        if waits and absent is not None and hits.of(absent) and hits.holds(absent, run.taken):
+            met.append(absent)
+            waits = False
+        if met:
+            run.closed = run.closed.union(met)
+        if not met and not plan.has_strict:
+            return
+        if waits or any(not (each.strict or run.closed.intersection(each.guards)) for each in targets):
+            if absent in run.closed:
+                self._set_deadline(run, targets)
+            return
+        if absent is None and self._is_match_at_its_end(run, targets):
+            certain.append(self._copy(run))
+        self._end(run)
+
+    # What follows
+
+    def _is_accepting(self, run: _Run) -> bool:
+        step = run.taken[1]
+        return run.count >= self._plan.least[step] and self._plan.may_end[step]
+
+    def _is_match_at_its_end(self, run: _Run, targets: tuple[Target, ...]) -> bool:
+        """Whether an accepting run waited to take more; if its first target divides it was a match at once."""
+        return self._is_accepting(run) and not targets[0].divides
+
+    def _set_deadline(self, run: _Run, targets: tuple[Target, ...]) -> None:
+        absent = self._plan.absent
+        if absent is not None and absent not in run.closed and self._is_accepting(run):
+            deadline = run.last + self._plan.absent_for
+        else:
+            deadline = run.begin + self._rules.within
+            gaps = [each.gap for each in targets if each.gap is not None]
+            if gaps and len(gaps) == len(targets):
+                deadline = min(deadline, run.last + max(gaps))
+        if deadline != run.deadline:
+            run.deadline = deadline
+            self._pushed += 1
+            heappush(self._timers, (deadline, self._pushed, run))
+
+    def _copy(self, run: _Run) -> _Run:
+        copy = _Run(run.serial, run.key, run.start, run.taken, run.count, run.begin, run.last)
+        copy.alive = run.alive
+        return copy
+
+    def _end(self, run: _Run) -> None:
+        if run.alive:
+            run.alive = False
+            self._held -= 1
+            self._has_ended = True
+
+    def _clear(self, key: Key) -> None:
+        """Let go of a partition's runs that have ended."""
+        left = [run for run in self._runs.get(key, ()) if run.alive]
+        if left:
+            self._runs[key] = left
+        else:
+            self._runs.pop(key, None)
+
+    def _drop(self) -> None:
+        """Keep to the bound: drop the runs that began first."""
+        runs = sorted((run for each in self._runs.values() for run in each), key=lambda run: (run.start, run.serial))
+        dropped = runs[: self._held - self._rules.most_runs]
+        for run in dropped:
+            self._end(run)
+            self._dropped += 1
+        for key in {run.key for run in dropped}:
+            self._clear(key)
+
+    # Which matches count
+
+    def _decided(self, certain: list[_Run], moment: int) -> list[Emission]:
+        """The results among matches that are certain at one moment, of one partition or of several."""
+        found: list[Emission] = []
+        barred_to: dict[Key, int] = {}
+        barred: set[tuple[Key, int]] = set()
+        for run in sorted(certain, key=_Run.rank):
+            if run.start <= barred_to.get(run.key, 0) or (run.key, run.start) in barred:
+                continue
+            found.append(self._emission(run, MATCH, moment))
+            if self._rules.bars_overlaps:
+                barred_to[run.key] = run.taken[3]
+                self._bar(run.key, lambda other, last=run.taken[3]: other.start <= last)  # type: ignore[misc]
+            elif self._rules.bars_same_start:
+                barred.add((run.key, run.start))
+                self._bar(run.key, lambda other, start=run.start: other.start == start)  # type: ignore[misc]
+        return found
+
+    def _bar(self, key: Key, is_barred: Callable[[_Run], bool]) -> None:
+        for other in self._runs.get(key, ()):
+            if other.alive and is_barred(other):
+                self._end(other)
+
+    def _emission(self, run: _Run, output: str, moment: int) -> Emission:
+        trail = run.trail()
+        waited = output == TIMED_OUT or self._plan.absent is not None
+        return Emission(
+            type=self._rules.type if output == MATCH or self._rules.timed_out is None else self._rules.timed_out,
+            parts=tuple((self._plan.names[step], fed.event) for _, step, fed, _ in trail),
+            output=output,
+            key=values_of(run.key),
+            features=self._measured(trail),
+            deadline=from_micros(moment) if waited else None,
+        )
+
+    def _measured(self, trail: Sequence[_Taken]) -> tuple[Feature, ...]:
+        found: list[tuple[str, FeatureValue]] = []
+        for name, measure in self._rules.measures.items():
+            of_step = [fed.event for _, at, fed, _ in trail if measure.step in (None, self._plan.names[at])]
+            value = measure.of(of_step)
+            if value is not None:
+                found.append((name, value))
+        return tuple(found)
+
+    # What time brings
+
+    def deadline(self) -> int | None:
+        """The moment after which `expire` has something to do."""
+        timers = self._timers
+        while timers:
+            deadline, _, run = timers[0]
+            if run.alive and run.deadline == deadline:
+                return deadline
+            heappop(timers)
+        return None
+
+    def expire(self, moment: int) -> Sequence[Emission]:
+        """Time has passed beyond `moment`: what matched or timed out because of it, by deadline."""
+        found: list[Emission] = []
+        while (deadline := self.deadline()) is not None and deadline <= moment:
+            due: list[_Run] = []
+            while self.deadline() == deadline:
+                due.append(heappop(self._timers)[2])
+                due[-1].deadline = None
+            found += self._expired(due, deadline)
+        return found
+
+    def _expired(self, due: list[_Run], deadline: int) -> list[Emission]:
+        certain, late = [], []
+        for run in due:
+            if self._is_accepting(run):
+                absent = self._plan.absent
+                is_match = absent not in run.closed if absent is not None else self._waits_for_more(run)
+                if is_match:
+                    certain.append(self._copy(run))
+                self._end(run)
+            else:
+                late.append(run)
+        found = self._decided(certain, deadline) if certain else []
+        if self._rules.timed_out is not None:
+            for run in sorted(late, key=_Run.rank):
+                if run.alive:
+                    found.append(self._emission(run, TIMED_OUT, deadline))
+        for run in late:
+            self._end(run)
+        for key in {run.key for run in due}:
+            self._clear(key)
+        return found
+
+    def _waits_for_more(self, run: _Run) -> bool:
+        return self._is_match_at_its_end(run, self._targets(run))
+
+    # What is kept
+
+    def counts(self) -> Mapping[str, int]:
+        """Unfinished runs, and how many were dropped."""
+        return {"partial": self._held, "dropped": self._dropped}
+
+    def held(self) -> Sequence[Fed]:
+        """The events that unfinished runs have taken, each once."""
+        found: dict[UUID, Fed] = {}
+        for runs in self._runs.values():
+            for run in runs:
+                for _, _, fed, _ in run.trail():
+                    found[fed.event.uid] = fed
+        return list(found.values())
+
+    def snapshot(self) -> Any:
+        """The state as plain JSON."""
+        return {
+            "place": self._place,
+            "serial": self._serial,
+            "dropped": self._dropped,
+            "runs": [
+                {
+                    "serial": run.serial,
+                    "key": [list(pair) for pair in run.key],
+                    "start": run.start,
+                    "taken": [[step, str(fed.event.uid), place] for _, step, fed, place in run.trail()],
+                    "closed": sorted(run.closed),
+                    "passed": run.passed,
+                }
+                for runs in self._runs.values()
+                for run in runs
+            ],
+        }
+
+    @classmethod
+    def resumed(cls, rules: Rules, plan: Plan, around: Judge, snapshot: Any, held: Mapping[str, Fed]) -> Self:
+        """The process of which `snapshot` was taken."""
+        process = cls(rules, plan, around)
+        process._place, process._serial = snapshot["place"], snapshot["serial"]
+        process._dropped = snapshot["dropped"]
+        for each in snapshot["runs"]:
+            run = _run_of(each, held)
+            process._runs.setdefault(run.key, []).append(run)
+            process._held += 1
+            process._set_deadline(run, process._targets(run))
+        return process
+
+
+def _run_of(told: Any, held: Mapping[str, Fed]) -> _Run:
+    taken: _Taken | None = None
+    count = 0
+    for step, uid, place in told["taken"]:
+        count = count + 1 if taken is not None and taken[1] == step else 1
+        taken = (taken, step, held[uid], place)
+    assert taken is not None  # noqa: S101 - a run begins by taking an event
+    feds = [held[uid] for _, uid, _ in told["taken"]]
+    key = tuple((kind, value) for kind, value in told["key"])
+    begin = min(fed.begin for fed in feds)
+    run = _Run(told["serial"], key, told["start"], taken, count, begin, feds[-1].moment)
+    run.closed = frozenset(told["closed"])
+    run.passed = told["passed"]
+    return run
+
+
+class _Hits:
+    """Which atoms one event is, each judged once and when it is asked for."""
+
+    __slots__ = ("_around", "_event", "_known", "_plan")
+
+    def __init__(self, plan: Plan, around: Judge, fed: Fed, statics: tuple[bool | None, ...]) -> None:
+        self._plan = plan
+        self._around = around
+        self._event = fed.event
+        self._known: Any = statics
+
+    def of(self, atom: int) -> bool:
+        """Whether the event matches the atom's cue."""
+        known: bool | None = self._known[atom]
+        if known is None:
+            known = self._around.matches(self._plan.atoms[atom].cue, self._event)
+            if isinstance(self._known, tuple):
+                self._known = list(self._known)
+            self._known[atom] = known
+        return known
+
+    def holds(self, atom: int, taken: _Taken | None) -> bool:
+        """Whether the atom's conditions hold for the event and what a run took."""
+        # Written out: most atoms have none, and all() of a generator takes its time for nothing.
+        for condition, step in self._plan.atoms[atom].conditions:
+            if not condition.holds(self._event, _taken_by(step, taken)):
+                return False
+        return True
+
+
+def _taken_by(step: int, taken: _Taken | None) -> list[StoredEvent]:
+    """The events that one step took, in order."""
+    found = []
+    while taken is not None:
+        if taken[1] == step:
+            found.append(taken[2].event)
+        taken = taken[0]
+    found.reverse()
+    return found

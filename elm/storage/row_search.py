@@ -1,0 +1,212 @@
+"""Where the rows of an answer stand: found first, in order, where reading them as they are found would cost more."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from geoalchemy2 import Geometry
+from sqlalchemy import (
+    TIMESTAMP,
+    BigInteger,
+    ColumnElement,
+    FromClause,
+    Integer,
+    LargeBinary,
+    Select,
+    Text,
+    bindparam,
+    func,
+    literal_column,
+    select,
+    tuple_,
+    union_all,
+)
+
+from elm.cues.algebra import And, Place
+from elm.interval import Window
+from elm.storage.conditions.rule import Bind, Condition
+from elm.storage.cue_compiler import CompiledCue
+from elm.storage.hints import is_guess
+from elm.storage.tables import event, frame
+from elm.store import Nearest, Order, Query
+
+_TIME = TIMESTAMP(timezone=True)
+
+WALK_FEWEST, WALK_MOST, WALK_FACTOR = 500, 2_000, 20
+"""How far the begin index is walked for a limited answer before the candidates are collected instead."""
+GLANCE_FACTOR = 2
+"""How many rows for each one wanted are looked at first: a cue that most events match needs no more."""
+HANDFUL = 50
+"""Up to so many candidates, or as many as are wanted, are sorted at once; of more the begin index tells the first."""
+
+
+def begin(e: FromClause) -> ColumnElement[Any]:
+    """When an event began."""
+    return func.lower(e.c.period)
+
+
+def row(e: FromClause) -> ColumnElement[Any]:
+    """Where a row stands: to read it again from there is one page, by its id three."""
+    return literal_column(f"{e.name}.ctid")  # type: ignore[attr-defined]
+
+
+def found_rows(compiled: CompiledCue, query: Query, *, pinned: bool, near: Window) -> Any:
+    """Where the rows of an answer stand, in order, if it pays to find that first; None where one plain scan does."""
+    if walks(query, pinned=pinned):
+        return _first(compiled, query, near)
+    if isinstance(query.order, Nearest):
+        # Of a cue that few match the index by distance would be walked to its end: then candidates are collected.
+        return _nearest(compiled, query) if query.limit is not None and query.cue == And() else None
+    if query.limit is None and query.order is not Order.ID and compiled.search is None and is_guess(query.cue):
+        return _scanned(compiled, query)
+    return None
+
+
+def _nearest(compiled: CompiledCue, query: Query) -> Any:
+    """The nearest events, and all that are as far as the last: by distance alone, for so the index has them."""
+    distance, _ = order(query)
+    place = [row(event).label("row"), distance.label("distance"), event.c.id]
+    limit = bindparam("limit", type_=BigInteger)
+    ties = select(*place).where(*conditions(compiled, query, event)).order_by(distance).fetch(limit, with_ties=True)
+    near = ties.subquery("ties")
+    return select(near).order_by(*keys(query, near)).limit(limit).subquery("nearest")
+
+
+def _scanned(compiled: CompiledCue, query: Query) -> Any:
+    """All rows of an answer that no index finds: the table is read from end to end, and little of it is sorted.
+
+    Left alone the planner reads the table along the begin index to save the sort: two and a half times its pages.
+    """
+    found = _collected(compiled, query, []).cte("found").prefix_with("MATERIALIZED")
+    return select(found).order_by(*keys(query, found)).offset(literal_column("0")).subquery("sorted")
+
+
+def walks(query: Query, *, pinned: bool) -> bool:
+    """Whether the first rows may be found by walking the begin index: an answer that can only be small is sorted."""
+    if query.limit is None or pinned or query.limit >= WALK_MOST:
+        return False
+    return not isinstance(query.order, Nearest)
+
+
+def _first(compiled: CompiledCue, query: Query, near: Window) -> Any:
+    """Where the rows of a limited answer are, at a cost bounded by its hits, however the cue correlates with time.
+
+    The planner takes a cue's hits to be spread evenly over time; where they are not, it walks the begin
+    index to its far end (377 ms where 6 would do). So, each step only where those before it did not do:
+    glance at the next rows; search for a handful by an index; walk a bounded number of rows; collect all
+    candidates and sort them (docs/adr/0009).
+    """
+    limit = bindparam("limit", type_=BigInteger)
+    steps: list[Select[Any]] = []
+    unsolved: list[Condition] = []
+    if compiled.search is not None:
+        glance = _walked(compiled, query, near, "glance", [])
+        short = _count(glance) < limit
+        most = bindparam("handful", type_=BigInteger)
+        handful = _searched(compiled, compiled.search, query, short, most)
+        too_many = _count(handful) > most
+        all_of_them = select(handful.c.row, handful.c.begin, handful.c.id).where(~too_many)
+        if not compiled.is_search:
+            all_of_them = all_of_them.where(compiled.condition(handful))
+        steps += [select(glance).where(~short), all_of_them]
+        unsolved.append(too_many)
+    walk = _walked(compiled, query, near, "walk", unsolved)
+    filled = _count(walk) >= limit
+    steps += [select(walk).where(filled), _collected(compiled, query, [*unsolved, ~filled])]
+    found = union_all(*steps).subquery("found")
+    return select(found).order_by(*keys(query, found)).limit(limit).subquery("ids")
+
+
+def _walked(compiled: CompiledCue, query: Query, near: Window, name: str, when: list[Condition]) -> Any:
+    """What matches among the next rows in order, of which parameter `name` says how many, up to the limit."""
+    bounds: list[Condition] = []
+    # Only where the walk goes along the begins do these bound it.
+    along_begin = query.order is not Order.ID
+    if along_begin and near.begin is not None:
+        bounds.append(begin(event) >= bindparam("near_begin", type_=_TIME))
+    if along_begin and near.end is not None:
+        bounds.append(begin(event) <= bindparam("near_end", type_=_TIME))
+    # The begin as a column: by it the planner knows that the rows are in order, and stops at the limit.
+    rows = select(event, *_place(event)).where(*bounds, *_after(query, event)).order_by(*order(query))
+    rows_near = rows.limit(bindparam(name, type_=Integer)).subquery("near")
+    matching = select(rows_near.c.row, rows_near.c.begin, rows_near.c.id)
+    ordered = matching.where(*when, compiled.condition(rows_near)).order_by(*keys(query, rows_near))
+    return ordered.limit(bindparam("limit", type_=BigInteger)).cte(name).prefix_with("MATERIALIZED")
+
+
+def _searched(
+    compiled: CompiledCue, search: Callable[[FromClause], Condition], query: Query, when: Condition, most: Bind
+) -> Any:
+    """What an index finds for the cue, in no order, and one more than `most` if there are more."""
+    wanted = [event.c.id] if compiled.is_search else [event]
+    found = select(*wanted, *_place(event)).where(when, search(event), *_after(query, event))
+    return found.limit(most + literal_column("1")).cte("handful").prefix_with("MATERIALIZED")
+
+
+def _collected(compiled: CompiledCue, query: Query, when: list[Condition]) -> Select[Any]:
+    return select(*_place(event), event.c.id).where(*when, *conditions(compiled, query, event))
+
+
+def _count(found: FromClause) -> ColumnElement[Any]:
+    return select(func.count()).select_from(found).scalar_subquery()
+
+
+def _place(e: FromClause) -> tuple[ColumnElement[Any], ColumnElement[Any]]:
+    return row(e).label("row"), begin(e).label("begin")
+
+
+def keys(query: Query, found: FromClause) -> list[ColumnElement[Any]]:
+    """The order of a query by the columns of what was found."""
+    if isinstance(query.order, Nearest):
+        return [found.c.distance, found.c.id]
+    if query.order is Order.ID:
+        return [found.c.id]
+    if query.order is Order.BEGIN_REVERSED:
+        return [found.c.begin.desc(), found.c.id.desc()]
+    return [found.c.begin, found.c.id]
+
+
+def conditions(compiled: CompiledCue, query: Query, e: FromClause) -> list[Condition]:
+    """What a row of an answer fulfils: the cue, to come after a cursor, to be in the frame of a distance."""
+    return [compiled.condition(e), *_after(query, e), *_placed(query, e)]
+
+
+def _after(query: Query, e: FromClause) -> list[Condition]:
+    if query.after is None:
+        return []
+    number = bindparam("after_id", type_=BigInteger)
+    if query.order is Order.ID:
+        return [e.c.id > number]
+    here = tuple_(begin(e), e.c.id)
+    there = tuple_(bindparam("after_begin", type_=_TIME), number)
+    return [here > there if query.order is Order.BEGIN else here < there]
+
+
+def _placed(query: Query, e: FromClause) -> list[Condition]:
+    if not isinstance(query.order, Nearest):
+        return []
+    # The frame by name: a nearest order has no cue whose frame number would be at hand.
+    name = bindparam("to_frame", type_=Text)
+    numbers = select(frame.c.id).where(frame.c.name == name).scalar_subquery()
+    return [e.c["frame_id" if query.order.place is Place.REGION else "subject_frame_id"] == numbers]
+
+
+def order(query: Query, e: FromClause = event) -> list[ColumnElement[Any]]:
+    """The order of a query by the columns of an event."""
+    match query.order:
+        case Order.BEGIN:
+            return [begin(e), e.c.id]
+        case Order.BEGIN_REVERSED:
+            return [begin(e).desc(), e.c.id.desc()]
+        case Order.ID:
+            return [e.c.id]
+        case Nearest(place=place):
+            to = func.ST_GeomFromWKB(bindparam("to", type_=LargeBinary), type_=Geometry)
+            return [e.c[place.value].op("<->")(to), e.c.id]
+
+
+def ordered(statement: Select[Any], query: Query) -> Select[Any]:
+    """A statement on events in the order of a query, and with its limit."""
+    sorted_rows = statement.order_by(*order(query))
+    return sorted_rows if query.limit is None else sorted_rows.limit(bindparam("limit", type_=BigInteger))

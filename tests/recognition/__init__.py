@@ -1,0 +1,1 @@
+"""Tests of recognizers: patterns against an enumeration of all that they might find."""
