@@ -16,7 +16,7 @@ from simulators.measurement import options, run
 from simulators.progress import progress
 from simulators.queries import CLASSES
 from simulators.report import Goal, Report, table_of
-from simulators.scratch import connect, scratch_memory
+from simulators.scratch import scratch_memory
 from simulators.timing import steady_heap
 
 EVENTS, QUICK_EVENTS = 100_000, 2_000
@@ -40,7 +40,7 @@ def main(argv: list[str]) -> int:
 def _measure(dsn: str, given: Namespace) -> Report:
     rounds = QUICK_ROUNDS if given.quick else ROUNDS
     with scratch_memory(dsn) as name, elm.connect(dsn, name) as memory:
-        _fill(dsn, memory, given)
+        _fill(memory, given)
         with steady_heap():
             with (
                 hand_sql.like_elm(dsn, name) as hand,
@@ -62,7 +62,7 @@ def _measure(dsn: str, given: Namespace) -> Report:
     return Report(figures=figures, goals=_goals(answers, figures), tables=tables)
 
 
-def _fill(dsn: str, memory: elm.Memory, given: Namespace) -> None:
+def _fill(memory: elm.Memory, given: Namespace) -> None:
     memory.add_types(hierarchy.event_types())
     with progress("loading", total=given.events) as advance:
         done = 0
@@ -73,10 +73,6 @@ def _fill(dsn: str, memory: elm.Memory, given: Namespace) -> None:
             done = count
 
         memory.load(islice(simulate(given.seed), given.events), progress=loaded)
-    with connect(dsn) as connection:
-        # Otherwise the server would do so by itself some time during the measurement.
-        connection.execute("SELECT set_config('search_path', %s, false)", [f'"{memory.name}", public'])
-        connection.execute("VACUUM (ANALYZE) event, part")
 
 
 def _figures(found: Answers) -> dict[str, Any]:

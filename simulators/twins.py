@@ -64,7 +64,7 @@ class Twins:
     def analyze(self) -> None:
         """Bring the planner's statistics on the twins up to date."""
         tables = sql.SQL(", ").join(map(self._twin, self._columns))
-        self._connection.execute(sql.SQL("ANALYZE {}").format(tables))
+        self._connection.execute(sql.SQL("VACUUM (ANALYZE) {}").format(tables))
 
     def count(self, table: str) -> int:
         """How many rows the twin of a table has."""

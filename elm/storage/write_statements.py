@@ -172,7 +172,9 @@ COMMIT_LEVEL = _LEVEL.replace(
     "ON CONFLICT (uid) DO UPDATE SET uid = excluded.uid WHERE event.content = excluded.content",
 )
 
-ANALYZE = "ANALYZE event, part, event_type, type_closure"
+# Not only statistics: what was loaded is marked as seen by all, so that links are read from their index alone, and
+# what still waits to enter the inverted indexes enters them. It costs a quarter more, and spares each recall pages.
+TIDY = "VACUUM (ANALYZE) event, part, event_type, type_closure, log_inbox"
 
 # Closing: the event first; then, each in later statements that see what others committed meanwhile, its wholes
 # and theirs, the smallest id next. Parts have smaller ids than their wholes: so each is recomputed after all below
