@@ -14,7 +14,7 @@ demo: setup  ## fill a memory with half an hour of a real robot's life and ask i
 	@.venv/bin/elm demo --picture out/plaza.png
 
 test: setup  ## all tests but the slow ones; in containers too where a Docker engine is at hand
-	@$$ELM_DOCKER_WRAPPER .venv/bin/python -m pytest -m "not slow"
+	@$$ELM_DOCKER_WRAPPER .venv/bin/python -m pytest -m "not slow" --numprocesses auto --maxprocesses 4 --dist loadfile
 
 test-slow: setup  ## long fuzzing and memories of 10^6 events
 	@$$ELM_DOCKER_WRAPPER .venv/bin/python -m pytest -m slow

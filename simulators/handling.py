@@ -21,9 +21,7 @@ PLACES = tuple(f"place-{number}" for number in range(8))
 HANDLING = ("Approach", "Grasp", "Lift", "Carry", "Place", "Release", "Push", "Pull")
 MISHAPS = ("Bump", "Slip", "Drop", "Fail")
 OTHERS = ("Open", "Close", "Pour", "Wipe", "Look", "Point", "Speak", "Listen", "Dock", "Charge", "Undock", "Wait")
-ROUTINE = ("Turn", "Stop", "Localize", "Scan", "Report", "Sleep", "Wake", "Greet")
-"""Nothing that `habits` looks at."""
-KINDS = (*HANDLING, *MISHAPS, *OTHERS, *ROUTINE)
+KINDS = (*HANDLING, *MISHAPS, *OTHERS)
 
 
 class Done(NamedTuple):
@@ -44,7 +42,7 @@ def types() -> list[EventType]:
 
 
 def live(
-    seed: int, *, kinds: Sequence[str] = KINDS, objects: int = 5, pause: float = 1.0, replaced: int = 0
+    seed: int, *, kinds: Sequence[str] = KINDS, objects: int = 20, pause: float = 1.0, replaced: int = 0
 ) -> Iterator[Done]:
     """What the robot does: kinds and objects equally likely, `pause` seconds between two on average.
 

@@ -4,48 +4,67 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from time import perf_counter
-from typing import Any
+from typing import Any, TypeVar
+
+import msgspec
 
 from elm.errors import InvalidValue
 from elm.recognition.results import Result, result_of
 from elm.recognition.strands import Strand
 from elm.recognizers.base import Emission, Fed, Judge, Process
 
+T = TypeVar("T")
 SELF_FEEDING = 20
 """How often results may be recognized from results that one event brought about."""
 
 
+@dataclass(slots=True, kw_only=True)
+class Count:
+    """What one recognizer's work amounted to; times in seconds."""
+
+    fed: int = 0
+    found: int = 0
+    cut: int = 0
+    """Results left out because they were recognized from too long a chain of results."""
+    slowest: float = 0.0
+    # Of this process alone:
+    fed_here: int = 0
+    seconds: float = 0.0
+
+
 class Tally:
-    """What a strand's work amounted to, by recognizer, for its status."""
+    """What a strand's work amounted to, for its status: by recognizer, in their order, and altogether."""
 
     def __init__(self, strand: Strand) -> None:
-        names = [each.name for each in strand.recognizers]
-        self.fed = dict.fromkeys(names, 0)
-        self.found = dict.fromkeys(names, 0)
-        self.cut = dict.fromkeys(names, 0)
-        """Results left out because they were recognized from too long a chain of results."""
+        self.counts = [Count() for _ in strand.recognizers]
         self.late = 0
         self.passed_over = 0
-        self.slowest = dict.fromkeys(names, 0.0)
-        # Of this process alone:
-        self.longest = 0.0
-        """The longest call since `longest_call` was asked last, in seconds."""
-        self.fed_here = dict.fromkeys(names, 0)
-        self.seconds = dict.fromkeys(names, 0.0)
+        self._longest = 0.0
+
+    def took(self, number: int, seconds: float) -> None:
+        """Note how long a call took."""
+        count = self.counts[number]
+        count.seconds += seconds
+        if seconds > self._longest:
+            self._longest = seconds
+            count.slowest = max(seconds, count.slowest)
 
     def longest_call(self) -> float:
-        """How long the longest call took since this was asked last, in seconds."""
-        longest, self.longest = self.longest, 0.0
+        """How long the longest call took since this was asked last."""
+        longest, self._longest = self._longest, 0.0
         return longest
 
     def snapshot(self) -> Any:
         """What is told of the whole past, as plain JSON."""
-        return [self.fed, self.found, self.cut, self.late, self.passed_over, self.slowest]
+        counts = [[each.fed, each.found, each.cut, each.slowest] for each in self.counts]
+        return [counts, self.late, self.passed_over]
 
     def resume(self, told: Any) -> None:
         """Count on from a snapshot."""
-        self.fed, self.found, self.cut, self.late, self.passed_over, self.slowest = told
+        counts, self.late, self.passed_over = told
+        self.counts = [Count(fed=fed, found=found, cut=cut, slowest=slow) for fed, found, cut, slow in counts]
 
 
 class RecognizerFailure(Exception):
@@ -68,6 +87,9 @@ class Bench:
             at: each.interest for at, each in enumerate(strand.recognizers) if each.across_agents is across
         }
         self._processes: dict[int, Process] = {}
+        self._deadlines: dict[int, int | None] = {}
+        self._due: tuple[int, int] | None = None
+        """The next deadline, and whose it is."""
         self._interested: dict[str, tuple[tuple[int, bool], ...]] = {}
 
     def interested(self, type_name: str) -> bool:
@@ -93,25 +115,19 @@ class Bench:
     def pass_time(self, moment: int) -> list[Result]:
         """What is certain because time has come to `moment`: deadlines strictly before it are over."""
         found: list[Result] = []
-        while (due := self._next_due()) is not None and due[0] < moment:
+        while (due := self._due) is not None and due[0] < moment:
             deadline, number = due
-            emitted = self._call(number, lambda process, until=deadline: process.expire(until))  # type: ignore[misc]
+            emitted = self._call(number, _expire, deadline)
+            if self._due == due:
+                error = InvalidValue("its deadline did not move when it was told that this was over")
+                raise RecognizerFailure(self._strand.recognizers[number].name, error)
             if told := self._results(number, emitted, deadline, 0):
                 found += self._saturate(told)
         return found
 
-    def _next_due(self) -> tuple[int, int] | None:
-        due = None
-        for number, process in self._processes.items():
-            deadline = process.deadline()
-            if deadline is not None and (due is None or (deadline, number) < due):
-                due = (deadline, number)
-        return due
-
     def next_deadline(self) -> int | None:
         """The moment that something waits to be over."""
-        due = self._next_due()
-        return None if due is None else due[0]
+        return None if self._due is None else self._due[0]
 
     def _saturate(self, given: list[tuple[Result, int]]) -> list[Result]:
         """Results and all that is found when each is fed, in the order in which they are."""
@@ -129,72 +145,98 @@ class Bench:
         for number, sure in self._interest_in(fed.event.type):
             if not sure and not self._judge.matches(self._interests[number], fed.event):
                 continue
-            recognizer = self._strand.recognizers[number]
-            self._tally.fed[recognizer.name] += 1
-            self._tally.fed_here[recognizer.name] += 1
-            emitted = self._call(number, lambda process: process.feed(fed))
-            found += self._results(number, emitted, fed.moment, depth + 1)
+            count = self._tally.counts[number]
+            count.fed += 1
+            count.fed_here += 1
+            emitted = self._call(number, _feed, fed)
+            # Mostly nothing was found; what is not even a sequence goes on, to be refused.
+            if emitted or not isinstance(emitted, list | tuple):
+                found += self._results(number, emitted, fed.moment, depth + 1)
         return found
 
-    def _call(self, number: int, work: Callable[[Process], Sequence[Emission]]) -> Sequence[Emission]:
-        recognizer = self._strand.recognizers[number]
+    def _call(self, number: int, work: Callable[[Process, T], Sequence[Emission]], given: T) -> Sequence[Emission]:
+        """Call a process, and see what it waits for now; whatever it raises is its failure."""
         start = perf_counter()
         try:
             process = self._processes.get(number)
             if process is None:
-                process = self._processes[number] = recognizer.start(self._judge)
-                self._processes = dict(sorted(self._processes.items()))
-            return work(process)
+                process = self._processes[number] = self._strand.recognizers[number].start(self._judge)
+            emitted = work(process, given)
+            deadline = process.deadline()
+            if deadline != self._deadlines.get(number):
+                self._set_deadline(number, deadline)
         except Exception as error:
-            raise RecognizerFailure(recognizer.name, error) from error
+            raise RecognizerFailure(self._strand.recognizers[number].name, error) from error
         finally:
-            took = perf_counter() - start
-            self._tally.seconds[recognizer.name] += took
-            if took > self._tally.longest:
-                self._tally.longest = took
-                self._tally.slowest[recognizer.name] = max(took, self._tally.slowest[recognizer.name])
+            self._tally.took(number, perf_counter() - start)
+        return emitted
+
+    def _set_deadline(self, number: int, deadline: int | None) -> None:
+        self._deadlines[number] = deadline
+        # Of recognizers that wait for the same moment, those that feed others first.
+        self._due = min(
+            ((until, at) for at, until in self._deadlines.items() if until is not None),
+            default=None,
+        )
 
     def _results(self, number: int, emitted: Sequence[Emission], moment: int, depth: int) -> list[tuple[Result, int]]:
-        # Nothing was found, the common case; what is not even a sequence goes on, to be refused.
-        if type(emitted) in (list, tuple) and not emitted:
-            return []
-        recognizer = self._strand.recognizers[number]
-        if depth > SELF_FEEDING:
-            self._tally.cut[recognizer.name] += len(emitted)
-            return []
+        recognizer, count = self._strand.recognizers[number], self._tally.counts[number]
         definition = self._strand.fingerprints[number]
         found = []
         try:
             if not isinstance(emitted, Sequence) or isinstance(emitted, str):
                 raise InvalidValue(f"a process returns a sequence of Emissions, not {emitted!r:.80}")
+            if depth > SELF_FEEDING:
+                count.cut += len(emitted)
+                return []
             for emission in emitted:
                 result = result_of(recognizer, definition, emission, moment=moment, agent=self._agent)
                 found.append((result, depth))
         except Exception as error:
             raise RecognizerFailure(recognizer.name, error) from error
-        self._tally.found[recognizer.name] += len(found)
+        count.found += len(found)
         return found
 
     # What is kept
 
     def counts(self) -> dict[str, dict[str, int]]:
         """What each recognizer's process counts."""
-        names = self._strand.recognizers
-        return {names[number].name: dict(process.counts()) for number, process in self._processes.items()}
+        return self._asked(lambda process: dict(process.counts()))
 
     def held(self) -> list[Fed]:
         """The events that processes refer to."""
-        return [fed for process in self._processes.values() for fed in process.held()]
+        return [fed for held in self._asked(lambda process: process.held()).values() for fed in held]
 
     def snapshot(self) -> Any:
-        """The processes' states as plain JSON, by recognizer."""
-        names = self._strand.recognizers
-        return {names[number].name: process.snapshot() for number, process in self._processes.items()}
+        """The processes' states as JSON, by recognizer."""
+        return self._asked(lambda process: msgspec.Raw(msgspec.json.encode(process.snapshot())))
+
+    def _asked(self, question: Callable[[Process], T]) -> dict[str, T]:
+        found = {}
+        for number, process in sorted(self._processes.items()):
+            name = self._strand.recognizers[number].name
+            try:
+                found[name] = question(process)
+            except Exception as error:
+                raise RecognizerFailure(name, error) from error
+        return found
 
     def resume(self, told: Any, held: Mapping[str, Fed]) -> None:
         """Have the processes of which a snapshot was taken."""
-        number = {each.name: at for at, each in enumerate(self._strand.recognizers)}
+        numbers = {each.name: at for at, each in enumerate(self._strand.recognizers)}
         for name, state in told.items():
-            recognizer = self._strand.recognizers[number[name]]
-            self._processes[number[name]] = recognizer.resume(self._judge, state, held)
-        self._processes = dict(sorted(self._processes.items()))
+            number = numbers[name]
+            try:
+                process = self._strand.recognizers[number].resume(self._judge, state, held)
+                self._processes[number] = process
+                self._set_deadline(number, process.deadline())
+            except Exception as error:
+                raise RecognizerFailure(name, error) from error
+
+
+def _feed(process: Process, fed: Fed) -> Sequence[Emission]:
+    return process.feed(fed)
+
+
+def _expire(process: Process, moment: int) -> Sequence[Emission]:
+    return process.expire(moment)

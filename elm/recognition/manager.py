@@ -26,6 +26,7 @@ from elm.errors import (
 from elm.interval import to_micros
 from elm.log import LoggedStore, Step
 from elm.recognition import checkpoint
+from elm.recognition.bench import RecognizerFailure
 from elm.recognition.clocks import Timing
 from elm.recognition.enrolment import enrolled
 from elm.recognition.fold import Fold, Work
@@ -242,7 +243,11 @@ class RecognitionManager:
         fold = Fold([Work(strand, self._judge)], self.timing, self._own)
         at = consumer.checkpoint
         if consumer.state is not None:
-            checkpoint.restored(fold, strand.name, consumer.state, self._store.get)
+            try:
+                checkpoint.restored(fold, strand.name, consumer.state, self._store.get)
+            except RecognizerFailure as failure:
+                self._fail(strand, failure)
+                return None
         while at < consumer.position:
             entries = self._store.log.read(at, min(self._batch, consumer.position - at))
             taken = fold.take(entries)
@@ -299,8 +304,12 @@ class RecognitionManager:
 
     def _commit(self, lane: _Lane, position: int, results: Sequence[tuple[str, Result]]) -> None:
         lane.batches += 1
-        steps = [self._step(lane, name, position) for name in lane.fold.works]
-        arrivals = [Arrival(event=event) for _, result in results for event in result.events]
+        steps = self._steps(lane, position)
+        if not steps:
+            self._lanes.remove(lane)
+            return
+        of_these = lane.fold.works.keys()
+        arrivals = [Arrival(event=event) for name, result in results if name in of_these for event in result.events]
         try:
             self._store.log.advance(steps, arrivals)
         except _REFUSALS as error:
@@ -317,6 +326,17 @@ class RecognitionManager:
             return
         lane.position = position
         self._set_slow_aside(lane)
+
+    def _steps(self, lane: _Lane, position: int) -> list[Step]:
+        """A step for each strand of a lane that can tell how it stands."""
+        found = []
+        for name in [*lane.fold.works]:
+            try:
+                found.append(self._step(lane, name, position))
+            except RecognizerFailure as failure:
+                lane.fold.remove(name)
+                self._fail(self._strands[name], failure)
+        return found
 
     def _step(self, lane: _Lane, name: str, position: int) -> Step:
         work = lane.fold.works[name]

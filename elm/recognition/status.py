@@ -59,7 +59,7 @@ def report_of(work: Work, consumer: str, clocks: Clocks, failures: Failures | No
     """The report of a strand that is at work."""
     tally, counts = work.tally, work.counts()
     recognizers = []
-    for each in work.strand.recognizers:
+    for each, count in zip(work.strand.recognizers, tally.counts, strict=True):
         name = each.name
         recognizers.append(
             {
@@ -67,12 +67,12 @@ def report_of(work: Work, consumer: str, clocks: Clocks, failures: Failures | No
                 "version": each.version,
                 "interest": cue_to_json(each.interest),
                 "outputs": [output.name for output in each.outputs],
-                "fed": tally.fed[name],
-                "found": tally.found[name],
-                "cut": tally.cut[name],
-                "seconds": round(tally.seconds[name], 6),
-                "fed_here": tally.fed_here[name],
-                "slowest": round(tally.slowest[name], 6),
+                "fed": count.fed,
+                "found": count.found,
+                "cut": count.cut,
+                "seconds": round(count.seconds, 6),
+                "fed_here": count.fed_here,
+                "slowest": round(count.slowest, 6),
                 "partial": counts[name].get("partial", 0),
                 "dropped": counts[name].get("dropped", 0),
                 "split": counts[name].get("split", 0),

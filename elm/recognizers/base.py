@@ -76,7 +76,10 @@ class Process(Protocol):
         """Take in an event; those that matched because of it. Moments never decrease."""
 
     def deadline(self) -> int | None:
-        """The moment after which `expire` has something to do, if nothing is fed before."""
+        """The moment after which `expire` has something to tell, if nothing is fed before.
+
+        What is only to be forgotten may wait for the next event.
+        """
 
     def expire(self, moment: int) -> Sequence[Emission]:
         """Time has passed beyond `moment` without a further event; what matched, or timed out, because of it."""

@@ -42,7 +42,20 @@ _Taken = tuple["_Taken | None", int, Fed, int]
 class _Run:
     """One way to take events: where it stands, what it took, and what has been closed to it since."""
 
-    __slots__ = ("alive", "begin", "closed", "count", "deadline", "key", "last", "passed", "serial", "start", "taken")
+    __slots__ = (
+        "alive",
+        "begin",
+        "closed",
+        "count",
+        "deadline",
+        "ends_silently",
+        "key",
+        "last",
+        "passed",
+        "serial",
+        "start",
+        "taken",
+    )
 
     def __init__(self, serial: int, key: Key, start: int, taken: _Taken, count: int, begin: int, last: int) -> None:
         self.serial = serial
@@ -57,6 +70,7 @@ class _Run:
         self.passed = False
         """Whether an event was passed over since the last one taken."""
         self.deadline: int | None = None
+        self.ends_silently = False
         self.alive = True
 
     def rank(self) -> tuple[list[int], list[int], Key]:
@@ -87,6 +101,8 @@ class Matching:
         self._around = around
         self._runs: dict[Key, list[_Run]] = {}
         self._timers: list[tuple[int, int, _Run]] = []
+        self._silent: list[tuple[int, int, _Run]] = []
+        """Deadlines of runs that nothing comes of: nobody need wait for them."""
         self._place = 0
         self._serial = 0
         self._pushed = 0
@@ -101,6 +117,8 @@ class Matching:
     def feed(self, fed: Fed) -> Sequence[Emission]:
         """Take in an event; those that matched because of it."""
         event = fed.event
+        if self._silent and self._silent[0][0] < fed.moment:
+            self._end_silent(fed.moment)
         try:
             statics = self._by_type[event.type]
         except KeyError:
@@ -153,7 +171,8 @@ class Matching:
                 first = target
                 break
         if first is None:
-            self._pass_over(run, targets, hits, certain)
+            if self._plan.watches[run.taken[1]]:
+                self._pass_over(run, targets, hits, certain)
         elif not first.divides:
             self._take(run, first, fed, certain)
         else:
@@ -164,7 +183,8 @@ class Matching:
                     self._runs[run.key].append(other)
                     self._held += 1
                     self._take(other, target, fed, certain)
-            self._pass_over(run, targets, hits, certain)
+            if self._plan.watches[run.taken[1]]:
+                self._pass_over(run, targets, hits, certain)
 
     def _targets(self, run: _Run) -> tuple[Target, ...]:
         return self._plan.targets(run.taken[1], run.count)
@@ -245,10 +265,19 @@ class Matching:
             gaps = [each.gap for each in targets if each.gap is not None]
             if gaps and len(gaps) == len(targets):
                 deadline = min(deadline, run.last + max(gaps))
-        if deadline != run.deadline:
-            run.deadline = deadline
+        ends_silently = not self._tells_at_its_end(run, targets)
+        if deadline != run.deadline or ends_silently is not run.ends_silently:
+            run.deadline, run.ends_silently = deadline, ends_silently
             self._pushed += 1
-            heappush(self._timers, (deadline, self._pushed, run))
+            heappush(self._silent if ends_silently else self._timers, (deadline, self._pushed, run))
+
+    def _tells_at_its_end(self, run: _Run, targets: tuple[Target, ...]) -> bool:
+        """Whether something is emitted when time has passed beyond a run's deadline."""
+        if not self._is_accepting(run):
+            return self._rules.timed_out is not None
+        if self._plan.absent is not None:
+            return self._plan.absent not in run.closed
+        return not targets[0].divides
 
     def _copy(self, run: _Run) -> _Run:
         copy = _Run(run.serial, run.key, run.start, run.taken, run.count, run.begin, run.last)
@@ -327,14 +356,26 @@ class Matching:
     # What time brings
 
     def deadline(self) -> int | None:
-        """The moment after which `expire` has something to do."""
+        """The moment after which `expire` has something to tell."""
         timers = self._timers
         while timers:
             deadline, _, run = timers[0]
-            if run.alive and run.deadline == deadline:
+            if run.alive and run.deadline == deadline and not run.ends_silently:
                 return deadline
             heappop(timers)
         return None
+
+    def _end_silent(self, moment: int) -> None:
+        """Let go of runs whose time was over before a moment, and that nothing comes of."""
+        silent = self._silent
+        keys: set[Key] = set()
+        while silent and silent[0][0] < moment:
+            deadline, _, run = heappop(silent)
+            if run.alive and run.deadline == deadline and run.ends_silently:
+                self._end(run)
+                keys.add(run.key)
+        for key in keys:
+            self._clear(key)
 
     def expire(self, moment: int) -> Sequence[Emission]:
         """Time has passed beyond `moment`: what matched or timed out because of it, by deadline."""
@@ -345,32 +386,25 @@ class Matching:
                 due.append(heappop(self._timers)[2])
                 due[-1].deadline = None
             found += self._expired(due, deadline)
+        self._end_silent(moment + 1)
         return found
 
     def _expired(self, due: list[_Run], deadline: int) -> list[Emission]:
         certain, late = [], []
         for run in due:
             if self._is_accepting(run):
-                absent = self._plan.absent
-                is_match = absent not in run.closed if absent is not None else self._waits_for_more(run)
-                if is_match:
-                    certain.append(self._copy(run))
+                certain.append(self._copy(run))
                 self._end(run)
             else:
                 late.append(run)
         found = self._decided(certain, deadline) if certain else []
-        if self._rules.timed_out is not None:
-            for run in sorted(late, key=_Run.rank):
-                if run.alive:
-                    found.append(self._emission(run, TIMED_OUT, deadline))
-        for run in late:
-            self._end(run)
+        for run in sorted(late, key=_Run.rank):
+            if run.alive:
+                found.append(self._emission(run, TIMED_OUT, deadline))
+                self._end(run)
         for key in {run.key for run in due}:
             self._clear(key)
         return found
-
-    def _waits_for_more(self, run: _Run) -> bool:
-        return self._is_match_at_its_end(run, self._targets(run))
 
     # What is kept
 

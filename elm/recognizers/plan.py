@@ -45,14 +45,16 @@ class Plan:
     names: tuple[str, ...]
     least: tuple[int, ...]
     most: tuple[int, ...]
-    again: tuple[Target, ...]
-    """For each step the target that is the step itself."""
     ahead: tuple[tuple[Target, ...], ...]
     """For each step the targets behind it."""
+    again_or_ahead: tuple[tuple[Target, ...], ...]
+    """For each step the target that is the step itself, and those."""
     may_end: tuple[bool, ...]
     """For each step whether all behind it may take nothing."""
     guards_behind: tuple[tuple[int, ...], ...]
     """For each step the negations on its ways on."""
+    watches: tuple[bool, ...]
+    """For each step whether a run that it took the last event for must look at events that it passes over."""
     absent: int | None
     absent_for: int
     has_strict: bool
@@ -60,10 +62,8 @@ class Plan:
     def targets(self, step: int, count: int) -> tuple[Target, ...]:
         """The targets of a run whose last event was taken by `step`, which has taken `count`."""
         if count < self.least[step]:
-            return (self.again[step],)
-        if count < self.most[step]:
-            return (self.again[step], *self.ahead[step])
-        return self.ahead[step]
+            return self.again_or_ahead[step][:1]
+        return self.again_or_ahead[step] if count < self.most[step] else self.ahead[step]
 
 
 def plan(elements: Sequence[Element]) -> Plan:
@@ -90,6 +90,10 @@ def plan(elements: Sequence[Element]) -> Plan:
             if steps[later].least > 0:
                 break
         ahead.append(tuple(found))
+    again = [_target(each, at, []) for at, each in enumerate(steps)]
+    may_end = [all(later.least == 0 for later in steps[at + 1 :]) for at in range(len(steps))]
+    guards_behind = [tuple(dict.fromkeys(g for target in way for g in target.guards)) for way in ahead]
+    has_strict = any(each.contiguity is Contiguity.STRICT for each in steps)
     return Plan(
         atoms=tuple(
             Atom(cue=each.cue, conditions=tuple((one, number[one.step]) for one in each.conditions)) for each in every
@@ -97,13 +101,17 @@ def plan(elements: Sequence[Element]) -> Plan:
         names=tuple(each.name for each in steps),
         least=tuple(each.least for each in steps),
         most=tuple(each.most for each in steps),
-        again=tuple(_target(each, at, []) for at, each in enumerate(steps)),
         ahead=tuple(ahead),
-        may_end=tuple(all(later.least == 0 for later in steps[at + 1 :]) for at in range(len(steps))),
-        guards_behind=tuple(tuple(dict.fromkeys(g for target in way for g in target.guards)) for way in ahead),
+        again_or_ahead=tuple((one, *others) for one, others in zip(again, ahead, strict=True)),
+        may_end=tuple(may_end),
+        guards_behind=tuple(guards_behind),
+        watches=tuple(
+            has_strict or bool(guards) or (absence is not None and ends)
+            for guards, ends in zip(guards_behind, may_end, strict=True)
+        ),
         absent=None if absence is None else len(every) - 1,
         absent_for=0 if absence is None else absence.duration // _MICROSECOND,
-        has_strict=any(each.contiguity is Contiguity.STRICT for each in steps),
+        has_strict=has_strict,
     )
 
 

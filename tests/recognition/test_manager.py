@@ -150,6 +150,34 @@ def test_a_recognizer_that_fails_stops_itself_alone(memory: LoggedStore, does: A
     assert found(memory, "Odd") == []
 
 
+@dataclass(frozen=True, kw_only=True)
+class OddAt(Odd):
+    """One whose process raises when one of its methods is called, or never comes to an end."""
+
+    method: str = "deadline"
+
+    def start(self, around: object) -> OddProcess:
+        process = OddProcess(lambda event: ())
+
+        def raises() -> Any:
+            raise RuntimeError("lost its mind")
+
+        answers = {"soon": ("deadline", lambda: 0), "set": ("snapshot", lambda: {object()})}
+        name, answer = answers.get(self.method, (self.method, raises))
+        setattr(process, name, answer)
+        return process
+
+
+@pytest.mark.parametrize("method", ["deadline", "snapshot", "held", "counts", "soon", "set"])
+def test_whatever_of_a_process_fails_stops_itself_alone(memory: LoggedStore, method: str) -> None:
+    tell(memory, "AB")
+    manager = RecognitionManager(memory, [OddAt(method=method), PAIR])
+    manager.catch_up()
+    odd, pair = manager.status()
+    assert (odd.name, odd.is_failing, odd.failures, odd.position) == ("odd", True, 1, 0)
+    assert (pair.is_failing, pair.lag, pair.found) == (False, 0, 1)
+
+
 def test_a_failing_recognizer_is_tried_again_and_misses_nothing(memory: LoggedStore) -> None:
     tell(memory, "AABA")
     healed = False
