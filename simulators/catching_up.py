@@ -42,8 +42,7 @@ def pattern() -> Pattern:
 
 def measure(dsn: str, *, events: int, rounds: int, seed: int, advance: Callable[[int], None]) -> dict[str, Any]:
     """Events per second of both, medians over rounds, each in a memory of its own."""
-    # Of each batch that is loaded the wholes enter the log behind all others: long after their time, and late.
-    life = list(islice((event for event in simulate(seed) if not event.is_complex), events))
+    life = list(islice(simulate(seed), events))
     loads, catches, results = [], [], 0
     with steady_heap():
         for _ in range(rounds):

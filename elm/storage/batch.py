@@ -1,29 +1,30 @@
-"""A batch of events made ready to be loaded: encoded, sorted into levels, and what needs no database refused."""
+"""A batch of events made ready to be loaded: sorted into levels, and what needs no database refused."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from uuid import UUID
 
 from elm.event import Event, content_hash
 from elm.storage.encoding import Row
-from elm.storage.event_writing import encoded
+from elm.storage.event_writing import encoder
 from elm.storage.names import NameCache
 from elm.store import Arrival
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Batch:
-    """What is refused already, the rows that repeat an earlier one, and the rest under their index, encoded."""
+    """What is refused already, the rows that repeat an earlier one, the rest by their index, and what encodes it."""
 
     arrivals: Sequence[Arrival]
     now: datetime
     heights: Sequence[int]
     refused: dict[int, str]
     repeats: set[int]
-    rows: dict[int, Row]
+    rest: Sequence[int]
+    encode: Callable[[Arrival], Row]
 
 
 def made_ready(arrivals: Sequence[Arrival], names: NameCache) -> Batch:
@@ -34,15 +35,15 @@ def made_ready(arrivals: Sequence[Arrival], names: NameCache) -> Batch:
     for index, arrival in enumerate(arrivals):
         if arrival.event.type not in types:
             refused[index] = f"unknown event type {arrival.event.type!r}: add it first (`elm types add`)"
-    kept = [index for index in range(len(arrivals)) if index not in refused and index not in repeats]
-    rows = encoded([arrivals[index] for index in kept], names, now)
+    rest = [index for index in range(len(arrivals)) if index not in refused and index not in repeats]
     return Batch(
         arrivals=arrivals,
         now=now,
         heights=levels([arrival.event for arrival in arrivals]),
         refused=refused,
         repeats=repeats,
-        rows=dict(zip(kept, rows, strict=True)),
+        rest=rest,
+        encode=encoder([arrivals[index].event for index in rest], names, now),
     )
 
 

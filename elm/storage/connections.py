@@ -92,7 +92,8 @@ def _translate(error: psycopg.Error, memory: str) -> ElmError:
         case psycopg.errors.InsufficientPrivilege():
             return DatabaseUnfit(
                 f"the database user lacks rights for memory {memory!r}: {said}. "
-                f"Grant them (CREATE on the database for a new memory, all on schema {memory!r} for an existing one)"
+                f"Grant them (CREATE on the database for a new memory; for an existing one all on schema {memory!r}, "
+                f"on its tables and on its sequences)"
             )
         case psycopg.errors.UndefinedTable() | psycopg.errors.InvalidSchemaName():
             return MemoryMissing(f"memory {memory!r} is missing or incomplete: {said}. Run `elm migrate`")
@@ -104,6 +105,9 @@ def _translate(error: psycopg.Error, memory: str) -> ElmError:
             return StoreFailure(f"the database cancelled a statement: {said}")
         case psycopg.errors.DeadlockDetected() | psycopg.errors.SerializationFailure():
             return TransactionUndone(f"writers of memory {memory!r} kept waiting for each other: {said}. Try again")
+        case psycopg.errors.CheckViolation() if error.diag.table_name == "part":
+            # An id was reserved for a whole before another process drew that of its part.
+            return TransactionUndone(f"parts of events of memory {memory!r} were written meanwhile: {said}. Try again")
         case psycopg.OperationalError() | psycopg.InterfaceError():
             return DatabaseUnreachable(f"the connection to the database was lost: {said}. Try again")
         case _:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import UTC, datetime, timedelta
 from uuid import UUID
 
@@ -41,9 +41,12 @@ _PG_EPOCH = datetime(2000, 1, 1, tzinfo=UTC)
 _MICROSECOND = timedelta(microseconds=1)
 _UUID_OID, _TEXT_OID = 2950, 25
 
+int2: Callable[[int], bytes] = struct.Struct("!h").pack
+"""An integer of 16 bits."""
 int4: Callable[[int], bytes] = struct.Struct("!i").pack
 """An integer of 32 bits."""
-_int8 = struct.Struct("!q").pack
+int8: Callable[[int], bytes] = struct.Struct("!q").pack
+"""An integer of 64 bits."""
 _bounded = struct.Struct("!Biqiq").pack
 _open = struct.Struct("!Biq").pack
 _BOTH_INCLUSIVE, _LOWER_INCLUSIVE_UPPER_INFINITE = 0x06, 0x12
@@ -54,7 +57,7 @@ _uuid_item = struct.Struct("!i16s").pack
 
 def timestamp(moment: datetime) -> bytes:
     """A UTC datetime as timestamptz."""
-    return _int8((moment - _PG_EPOCH) // _MICROSECOND)
+    return int8((moment - _PG_EPOCH) // _MICROSECOND)
 
 
 def period(interval: Interval) -> bytes:
@@ -101,7 +104,7 @@ def row(event: Event, *, types: Mapping[str, int], frames: Mapping[str, int], re
         uuids(event.parts),
         timestamp(recorded_at),
         content_hash(event),
-        _int8(ends(feature_tokens)),
+        int8(ends(feature_tokens)),
     )
 
 
@@ -130,9 +133,9 @@ COPY_END = b"\xff\xff"
 """What a binary COPY ends with."""
 
 
-def copied(values: Iterable[bytes | None], count: int) -> bytes:
-    """One row of `count` values in the format of a binary COPY."""
-    pieces = [count.to_bytes(2)]
+def copied(values: Row) -> bytes:
+    """One row of values in the format of a binary COPY."""
+    pieces = [len(values).to_bytes(2)]
     for value in values:
         pieces += (b"\xff\xff\xff\xff",) if value is None else (int4(len(value)), value)
     return b"".join(pieces)

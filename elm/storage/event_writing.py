@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 from heapq import heapify, heappop, heappush
 from uuid import UUID
 
-from elm.errors import ConflictingContent, CycleRefused, ExtentRefused, InvalidValue, UnknownEvent
+from elm.errors import ConflictingContent, ExtentRefused, InvalidValue, UnknownEvent
 from elm.event import Event, StoredEvent, content_hash
 from elm.storage import encoding, prepared
 from elm.storage import write_statements as sql
@@ -21,16 +21,19 @@ Stored = Callable[[Sequence[UUID]], Iterable[StoredEvent]]
 
 def encoded(arrivals: Sequence[Arrival], names: NameCache, now: datetime) -> list[encoding.Row]:
     """The rows of arrivals; unknown types are an error, new frames are added."""
-    events = [arrival.event for arrival in arrivals]
+    return [*map(encoder([arrival.event for arrival in arrivals], names, now), arrivals)]
+
+
+def encoder(events: Sequence[Event], names: NameCache, now: datetime) -> Callable[[Arrival], encoding.Row]:
+    """What makes the rows of arrivals of these events; unknown types are an error, new frames are added."""
     types = names.type_ids([event.type for event in events])
     places = [(event, place.frame) for event in events for place in (event.region, event.subject) if place is not None]
     frames = names.frame_ids([frame for event, frame in places if not event.parts])
     # The frame of an extent that derives is there already, or the extent given is not the derived one.
     frames = frames | {frame: names.frame_id(frame) for event, frame in places if event.parts}
-    return [
-        encoding.row(arrival.event, types=types, frames=frames, recorded_at=arrival.recorded_at or now)
-        for arrival in arrivals
-    ]
+    return lambda arrival: encoding.row(
+        arrival.event, types=types, frames=frames, recorded_at=arrival.recorded_at or now
+    )
 
 
 def commit(connection: Connection, event: Event, row: encoding.Row, now: datetime) -> Committed | None:
@@ -42,32 +45,6 @@ def commit(connection: Connection, event: Event, row: encoding.Row, now: datetim
     (number, existed), *_ = found
     assert number is not None  # noqa: S101 - a primary key
     return Committed(id=int.from_bytes(number), uid=event.uid, new=existed == b"\0")
-
-
-def wholes_last(arrivals: Sequence[Arrival]) -> list[Arrival]:
-    """The arrivals, each once, level by level: those without parts among them first, then their wholes.
-
-    A ring of parts is refused, and so is another event under a uid that stands before.
-    """
-    known: dict[UUID, Arrival] = {}
-    for arrival in arrivals:
-        event = arrival.event
-        first = known.setdefault(event.uid, arrival).event
-        if first is not event and content_hash(first) != content_hash(event):
-            raise ConflictingContent(f"two different events of one call have the uid {event.uid}: give one a new uid")
-    waiting = {uid: {part for part in arrival.event.parts if part in known} for uid, arrival in known.items()}
-    ordered: list[Arrival] = []
-    done: set[UUID] = set()
-    while waiting:
-        level = [uid for uid, parts in waiting.items() if parts <= done]
-        if not level:
-            ring = ", ".join(sorted(map(str, waiting))[:5])
-            raise CycleRefused(f"events of one call are parts of themselves, through each other; among them: {ring}")
-        ordered += [known[uid] for uid in level]
-        done.update(level)
-        for uid in level:
-            del waiting[uid]
-    return ordered
 
 
 def same_or_refused(event: Event, stored: Stored) -> Committed:

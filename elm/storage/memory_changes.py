@@ -12,8 +12,9 @@ from elm.errors import ConflictingContent, ElmError, InvalidValue, UnknownEvent
 from elm.event import Event, StoredEvent, content_hash
 from elm.interval import Interval, as_utc
 from elm.log import LogKind, Tick
-from elm.storage.memory_events import as_stored, changed, parts_first, span
+from elm.storage.memory_events import as_stored, changed, span
 from elm.storage.memory_index import EventIndex
+from elm.storage.parts_first import parts_first
 from elm.store import Arrival, BatchReport, Closed, Committed, Refusal
 from elm.taxonomy import Taxonomy
 
@@ -49,7 +50,8 @@ class Changes:
             elif new.setdefault(event.uid, (arrival, content))[1] != content:
                 raise ConflictingContent(f"uid {event.uid} is given to two different events: give one a new uid")
         self._check_parts(new)
-        staged = self._staged({uid: arrival for uid, (arrival, _) in new.items()})
+        order = [event.uid for event in parts_first(arrival.event for arrival in arrivals)]
+        staged = self._staged([new[uid][0] for uid in order if uid in new])
         for stored in staged.values():
             self._index.add(stored)
             self._contents[stored.uid] = new[stored.uid][1]
@@ -79,12 +81,12 @@ class Changes:
                         f"event {arrival.event.uid} has the unknown part {part}: commit that event first"
                     )
 
-    def _staged(self, new: Mapping[UUID, Arrival]) -> dict[UUID, StoredEvent]:
-        """The new events as they will be kept, parts first, numbered in that order."""
+    def _staged(self, new: Sequence[Arrival]) -> dict[UUID, StoredEvent]:
+        """The new events, of which parts come first, as they will be kept, numbered in their order."""
         now = datetime.now(UTC)
         staged: dict[UUID, StoredEvent] = {}
-        for event in parts_first(arrival.event for arrival in new.values()):
-            recorded_at = new[event.uid].recorded_at
+        for arrival in new:
+            event, recorded_at = arrival.event, arrival.recorded_at
             staged[event.uid] = as_stored(
                 event,
                 [staged[part] if part in staged else self._index[part] for part in event.parts],

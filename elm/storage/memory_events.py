@@ -1,55 +1,15 @@
-"""How the store in this process makes stored events of given ones: parts first, extents and agent derived."""
+"""How the store in this process makes stored events of given ones: extents and agent derived."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from datetime import datetime
 from typing import Any
-from uuid import UUID
 
-from elm.errors import CycleRefused, ExtentRefused
+from elm.errors import ExtentRefused
 from elm.event import Event, StoredEvent
 from elm.geometry import Region, derived_region, same_extent
 from elm.interval import Interval
-
-
-def parts_first(events: Iterable[Event]) -> list[Event]:
-    """The events level by level, so that the parts among them come earlier; a circle is refused."""
-    waiting = {event.uid: event for event in events}
-    missing = {uid: sum(part in waiting for part in event.parts) for uid, event in waiting.items()}
-    wholes: dict[UUID, list[UUID]] = {}
-    for uid, event in waiting.items():
-        for part in event.parts:
-            wholes.setdefault(part, []).append(uid)
-    rank = {uid: number for number, uid in enumerate(waiting)}
-    found: list[Event] = []
-    ready = [uid for uid, count in missing.items() if count == 0]
-    while ready:
-        found += [waiting.pop(uid) for uid in ready]
-        later = []
-        for part in ready:
-            for whole in wholes.get(part, ()):
-                missing[whole] -= 1
-                if missing[whole] == 0:
-                    later.append(whole)
-        ready = sorted(later, key=rank.__getitem__)
-    if waiting:
-        raise CycleRefused(
-            f"events cannot be parts of each other: {' has part '.join(map(str, _circle(waiting)))}. "
-            f"Remove one of these links"
-        )
-    return found
-
-
-def _circle(events: dict[UUID, Event]) -> list[UUID]:
-    """A circle of links among events each of which has a part among them."""
-    path: dict[UUID, None] = {}
-    uid = next(iter(events))
-    while uid not in path:
-        path[uid] = None
-        uid = next(part for part in events[uid].parts if part in events)
-    ring = [*path]
-    return [*ring[ring.index(uid) :], uid]
 
 
 def as_stored(event: Event, parts: Sequence[StoredEvent], *, number: int, recorded_at: datetime) -> StoredEvent:

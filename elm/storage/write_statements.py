@@ -1,4 +1,4 @@
-"""The statements that write: each commits one event, or one level of a batch, with its links and log entries."""
+"""The statements that write: each commits one event with its links and log entry, or one level of many."""
 
 from __future__ import annotations
 
@@ -92,22 +92,22 @@ SELECT id, existed FROM new
 """)
 
 # Many events: copied into a temporary table, they go from there level by level, for a statement does not see the
-# rows it inserts itself. Of a load, the atomic ones are copied into the table itself.
+# rows it inserts itself. Of a load, the atomic ones are copied into the table itself. All have their ids before, and
+# enter the log at the end: both in the order in which they were given, whatever their level.
+
+RESERVE_IDS = """
+SELECT nextval((SELECT pg_get_serial_sequence('event', 'id')::regclass)) FROM generate_series(1, %s)
+"""
 
 CONTENTS = "SELECT uid, content FROM event WHERE uid = ANY(%s)"
 
-COPY_EVENTS = _filled("COPY event (<columns>) FROM STDIN (FORMAT BINARY)")
+COPY_EVENTS = _filled("COPY event (id, <columns>) FROM STDIN (FORMAT BINARY)")
 
-LOG_COPIED = _filled("""
-INSERT INTO log_inbox (event_id, kind, agent, at)
-SELECT id, <kind>, agent, %(now)s
-FROM (SELECT id, agent, upper_inf(period) AS is_open FROM event WHERE uid = ANY(%(uids)s)) copied
-ORDER BY id
-""")
+COPY_LOG = "COPY log_inbox (event_id, kind, agent, at) FROM STDIN (FORMAT BINARY)"
 
 CREATE_STAGING = """
 CREATE TEMPORARY TABLE IF NOT EXISTS staging (
-    row integer NOT NULL, level integer NOT NULL, uid uuid, type_id integer, period tstzrange, frame_id integer,
+    id bigint NOT NULL, level integer NOT NULL, uid uuid, type_id integer, period tstzrange, frame_id integer,
     region geometry, subject_frame_id integer, subject geometry, feature_tokens text[], feature_names text[],
     features json, agent text, media_type text, payload bytea, parts uuid[], recorded_at timestamptz, content bytea,
     feature_ends bigint
@@ -116,57 +116,47 @@ CREATE TEMPORARY TABLE IF NOT EXISTS staging (
 
 COPY_STAGING = "COPY staging FROM STDIN (FORMAT BINARY)"
 
-# What `COMMIT_ATOMIC` does, for all staged events without parts.
+# What `COMMIT_ATOMIC` does but for the log, for all staged events without parts.
 COMMIT_STAGED = _filled("""
-WITH new AS (
-    INSERT INTO event (<columns>) SELECT <columns> FROM staging WHERE level = 0 ORDER BY row
-    ON CONFLICT (uid) DO UPDATE SET uid = excluded.uid WHERE event.content = excluded.content
-    RETURNING id, uid, agent, upper_inf(period) AS is_open, xmax <> 0 AS existed
-), logged AS (
-    INSERT INTO log_inbox (event_id, kind, agent, at)
-    SELECT id, <kind>, agent, %(now)s FROM new WHERE NOT existed ORDER BY id
-)
-SELECT id, uid, existed FROM new
+INSERT INTO event (id, <columns>) OVERRIDING SYSTEM VALUE
+SELECT id, <columns> FROM staging WHERE level = 0 ORDER BY id
+ON CONFLICT (uid) DO UPDATE SET uid = excluded.uid WHERE event.content = excluded.content
+RETURNING id, uid, xmax <> 0 AS existed, upper_inf(period) AS is_open, agent
 """)
 
-LOCK_OPEN_PARTS = """
-SELECT id FROM event
-WHERE uid IN (SELECT unnest(parts) FROM staging WHERE level > 0) AND upper_inf(period)
-ORDER BY id FOR SHARE
-"""
+# Only of parts that were there before: those of the same transaction nobody else can close.
+LOCK_OPEN_PARTS = "SELECT id FROM event WHERE uid = ANY(%s) AND upper_inf(period) ORDER BY id FOR SHARE"
 
 _LEVEL = _filled("""
 WITH p AS MATERIALIZED (
-    SELECT s.row, asked.ordinal, e.id, e.uid, e.period, e.frame_id, e.region, e.subject_frame_id, e.subject, e.agent
+    SELECT s.id AS whole_id, asked.ordinal, e.id, e.uid, e.period, e.frame_id, e.region, e.subject_frame_id,
+           e.subject, e.agent
     FROM staging s, unnest(s.parts) WITH ORDINALITY AS asked (uid, ordinal) JOIN event e ON e.uid = asked.uid
     WHERE s.level = %(level)s
 ), x AS (
-    SELECT p.row, count(*) AS found, <extent> FROM p GROUP BY p.row
+    SELECT p.whole_id, count(*) AS found, <extent> FROM p GROUP BY p.whole_id
 ), new AS (
-    INSERT INTO event (<columns>)
-    SELECT s.uid, s.type_id, x.period, x.frame_id, x.region, x.subject_frame_id, x.subject, s.feature_tokens,
+    INSERT INTO event (id, <columns>) OVERRIDING SYSTEM VALUE
+    SELECT s.id, s.uid, s.type_id, x.period, x.frame_id, x.region, x.subject_frame_id, x.subject, s.feature_tokens,
            s.feature_names, s.features, coalesce(s.agent, x.agent), s.media_type, s.payload, s.parts,
            s.recorded_at, s.content, s.feature_ends
-    FROM staging s JOIN x ON x.row = s.row
+    FROM staging s JOIN x ON x.whole_id = s.id
     WHERE s.level = %(level)s AND x.found = cardinality(s.parts) AND <agrees s.>
-    ORDER BY s.row
+    ORDER BY s.id
     <conflict>
-    RETURNING id, uid, agent, upper_inf(period) AS is_open, xmax <> 0 AS existed
+    RETURNING id, uid, xmax <> 0 AS existed, upper_inf(period) AS is_open, agent
 ), linked AS (
     INSERT INTO part (whole_id, part_id, ordinal, whole_uid)
     SELECT new.id, p.id, p.ordinal, new.uid
-    FROM new JOIN staging s ON s.uid = new.uid JOIN p ON p.row = s.row
+    FROM new JOIN p ON p.whole_id = new.id
     WHERE NOT existed
-), logged AS (
-    INSERT INTO log_inbox (event_id, kind, agent, at)
-    SELECT id, <kind>, agent, %(now)s FROM new WHERE NOT existed ORDER BY id
 )
-SELECT id, uid, existed FROM new
+SELECT id, uid, existed, is_open, agent FROM new
 """)
 
 # A load knows which uids are taken, and begins anew when others take one meanwhile.
 LOAD_LEVEL = _LEVEL.replace("<conflict>", "")
-# What `COMMIT_COMPLEX` does, for one level of staged events.
+# What `COMMIT_COMPLEX` does but for the log, for one level of staged events.
 COMMIT_LEVEL = _LEVEL.replace(
     "<conflict>",
     "ON CONFLICT (uid) DO UPDATE SET uid = excluded.uid WHERE event.content = excluded.content",

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from uuid import UUID
 
+from elm.errors import ConflictingContent
+from elm.event import content_hash
+from elm.storage import staging
 from elm.storage import write_statements as sql
 from elm.storage.batch import levels
 from elm.storage.connections import Connection
-from elm.storage.event_writing import Stored, commit, encoded, same_or_refused, wholes_last
+from elm.storage.event_writing import Stored, commit, encoded, same_or_refused
 from elm.storage.names import NameCache
-from elm.storage.staging import stage
+from elm.storage.parts_first import parts_first
+from elm.storage.staging import Written
 from elm.store import Arrival, Committed
 
 MANY = 16
@@ -25,9 +29,9 @@ class Together:
     def __init__(self, arrivals: Sequence[Arrival], names: NameCache) -> None:
         self._asked = [arrival.event.uid for arrival in arrivals]
         self._now = datetime.now(UTC)
-        ordered = wholes_last(arrivals)
-        self._events = [arrival.event for arrival in ordered]
-        self._rows = encoded(ordered, names, self._now)
+        once = _once(arrivals)
+        self._events = parts_first(arrival.event for arrival in once.values())
+        self._rows = encoded([once[event.uid] for event in self._events], names, self._now)
 
     def commit(self, connection: Connection, stored: Stored) -> list[Committed]:
         """Write them within the transaction of the connection; what became of each, in the order given."""
@@ -52,12 +56,29 @@ class Together:
 
     def _staged(self, connection: Connection) -> dict[UUID, Committed]:
         heights = levels(self._events)
-        stage(connection, list(zip(range(len(heights)), heights, self._rows, strict=True)))
-        found = connection.execute(sql.COMMIT_STAGED, {"now": self._now}, binary=True).fetchall()
+        ids = staging.reserved_ids(connection, len(heights))
+        staging.stage(connection, zip(ids, heights, self._rows, strict=True))
+        found = connection.execute(sql.COMMIT_STAGED, binary=True).fetchall()
         if above := sorted(set(heights) - {0}):
-            connection.execute(sql.LOCK_OPEN_PARTS)
+            own = {UUID(bytes=raw) for _, raw, existed, *_ in found if not existed}
+            outside = [part for event in self._events for part in event.parts if part not in own]
+            connection.execute(sql.LOCK_OPEN_PARTS, [outside])
         for level in above:
-            found += connection.execute(sql.COMMIT_LEVEL, {"level": level, "now": self._now}, binary=True).fetchall()
+            found += connection.execute(sql.COMMIT_LEVEL, {"level": level}, binary=True).fetchall()
+        written = [Written(number, is_open, agent) for number, _, existed, is_open, agent in found if not existed]
+        staging.log(connection, written, self._now)
         return {
-            (uid := UUID(bytes=raw)): Committed(id=number, uid=uid, new=not existed) for number, raw, existed in found
+            (uid := UUID(bytes=raw)): Committed(id=number, uid=uid, new=not existed)
+            for number, raw, existed, *_ in found
         }
+
+
+def _once(arrivals: Iterable[Arrival]) -> dict[UUID, Arrival]:
+    """The arrivals by uid; another event under a uid that stands before is refused."""
+    known: dict[UUID, Arrival] = {}
+    for arrival in arrivals:
+        event = arrival.event
+        first = known.setdefault(event.uid, arrival).event
+        if first is not event and content_hash(first) != content_hash(event):
+            raise ConflictingContent(f"two different events of one call have the uid {event.uid}: give one a new uid")
+    return known

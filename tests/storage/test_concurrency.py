@@ -20,7 +20,7 @@ from elm import cues
 from elm.errors import ConflictingContent, CycleRefused, InvalidValue, UnknownEvent
 from elm.event import Event
 from elm.storage.postgres import PostgresStore
-from elm.store import Arrival, Closed, Committed, Query, Store
+from elm.store import Arrival, Closed, Committed, Order, Query, Store
 from elm.taxonomy import EventType
 from tests.clock import at, span
 from tests.servers import MEMORY
@@ -78,13 +78,14 @@ class Robots:
         return store
 
     @contextmanager
-    def stopped_at(self, table: str) -> Iterator[None]:
-        """Whoever inserts into `table` waits thereafter, amid the transaction, until the block ends.
+    def stopped_at(self, table: str, only: Event | None = None) -> Iterator[None]:
+        """Whoever inserts into `table` (or only this event) waits thereafter, amid the transaction, till the end.
 
-        For `log_inbox` that is when a commit, a close, or a level of a load has done all else.
+        For `log_inbox` that is when a commit, a close, or a load has done all else.
         """
-        trigger = sql.SQL("CREATE TRIGGER stop AFTER INSERT ON {} FOR EACH ROW EXECUTE FUNCTION stop()")
-        self._watch.execute(trigger.format(sql.Identifier(table)))
+        trigger = sql.SQL("CREATE TRIGGER stop AFTER INSERT ON {} FOR EACH ROW {} EXECUTE FUNCTION stop()")
+        when = sql.SQL("WHEN (NEW.uid = {})").format(only.uid) if only else sql.SQL("")
+        self._watch.execute(trigger.format(sql.Identifier(table), when))
         self._watch.execute("SELECT pg_advisory_lock(1)")
         try:
             yield
@@ -400,6 +401,26 @@ def test_whole_is_refused_until_its_part_is_committed(robots: Robots, threads: T
     assert committing.result().new
     assert second.commit(Arrival(event=over)).new
     assert robots.count("log_inbox") == 2
+
+
+@pytest.mark.parametrize("write", [_commit_all, _load], ids=["commit_all", "load"])
+def test_part_committed_after_the_id_of_its_whole_was_reserved(
+    robots: Robots, threads: ThreadPoolExecutor, write: Callable[..., object]
+) -> None:
+    """The call begins anew: its ids and log entries stand behind those of the part."""
+    part = going_on()
+    over, beside = whole(part), [going_on() for _ in range(20)]
+    second = robots.another()
+    with robots.stopped_at("event", only=beside[0]):
+        writing = threads.submit(write, robots.store, *beside, over)
+        robots.wait_for_locks(writing)
+        committed = second.commit(Arrival(event=part))
+    writing.result()
+    events = list(robots.store.find(Query(order=Order.ID)))
+    assert [event.uid for event in events] == [event.uid for event in (part, *beside, over)]
+    assert events[0].id == committed.id
+    log = robots.store.log
+    assert [entry.event for entry in log.read(0, log.head())] == events
 
 
 def test_part_and_whole_race(robots: Robots, threads: ThreadPoolExecutor) -> None:

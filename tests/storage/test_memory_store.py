@@ -91,7 +91,7 @@ def test_it_fits_the_port() -> None:
 def test_ids_count_from_one_in_the_order_of_commit_and_parts_come_first(store: MemoryStore) -> None:
     top, middle, low, other = whole("top", "middle"), whole("middle", "low"), event("low"), event("other")
     committed = store.commit_all(arrivals(top, middle, low, other))
-    assert [one.id for one in committed] == [4, 3, 1, 2]
+    assert [one.id for one in committed] == [3, 2, 1, 4]
     assert [one.uid for one in committed] == [top.uid, middle.uid, low.uid, other.uid]
     assert store.commit(Arrival(event=event("last"))).id == 5
 
