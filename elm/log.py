@@ -121,7 +121,7 @@ class Log(Protocol):
         """The consumer of this name; a new one begins behind `position`."""
 
     def advance(self, steps: Sequence[Step], results: Sequence[Arrival] = ()) -> list[Committed]:
-        """Commit results and move consumers on, all in one transaction.
+        """Commit results, in the order given but parts first, and move consumers on, all in one transaction.
 
         A consumer that is not at its step's `before` refuses the whole call with `PositionLost`: another
         process has done the work.

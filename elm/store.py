@@ -261,7 +261,7 @@ class Store(Protocol):
         """Keep one event whose parts are all in the memory."""
 
     def commit_all(self, arrivals: Sequence[Arrival]) -> list[Committed]:
-        """Keep all or none; events may be parts of each other in any order."""
+        """Keep all or none; events may be parts of each other in any order, and are numbered parts first."""
 
     def load(self, arrivals: Sequence[Arrival]) -> BatchReport:
         """Keep what can be kept of a batch whose parts come before their wholes or are in the memory."""

@@ -10,14 +10,15 @@ from typing import Any, TypeVar
 
 import msgspec
 
-from elm.errors import InvalidValue
-from elm.recognition.results import Result, result_of
+from elm.errors import ElmError, InvalidValue
+from elm.event import StoredEvent
+from elm.recognition.results import Result, depth_of, result_of
 from elm.recognition.strands import Strand
 from elm.recognizers.base import Emission, Fed, Judge, Process
 
 T = TypeVar("T")
 SELF_FEEDING = 20
-"""How often results may be recognized from results that one event brought about."""
+"""How many layers of recognized events may lie beneath one, and follow from one event."""
 
 
 @dataclass(slots=True, kw_only=True)
@@ -47,9 +48,10 @@ class Tally:
         """Note how long a call took."""
         count = self.counts[number]
         count.seconds += seconds
+        if seconds > count.slowest:
+            count.slowest = seconds
         if seconds > self._longest:
             self._longest = seconds
-            count.slowest = max(seconds, count.slowest)
 
     def longest_call(self) -> float:
         """How long the longest call took since this was asked last."""
@@ -70,7 +72,7 @@ class Tally:
 class RecognizerFailure(Exception):
     """A recognizer raised, or emitted what cannot be a result."""
 
-    def __init__(self, recognizer: str, error: Exception) -> None:
+    def __init__(self, recognizer: str, error: BaseException) -> None:
         super().__init__(f"{recognizer}: {type(error).__name__}: {error}")
         self.recognizer = recognizer
 
@@ -99,9 +101,22 @@ class Bench:
     def _interest_in(self, type_name: str) -> tuple[tuple[int, bool], ...]:
         known = self._interested.get(type_name)
         if known is None:
-            told = [(at, self._judge.of_type(interest, type_name)) for at, interest in self._interests.items()]
+            told = [(at, self._may_want(at, type_name)) for at in self._interests]
             known = self._interested[type_name] = tuple((at, sure is True) for at, sure in told if sure is not False)
         return known
+
+    def _may_want(self, number: int, type_name: str) -> bool | None:
+        try:
+            return self._judge.of_type(self._interests[number], type_name)
+        except ElmError:
+            # What cannot be judged by its type is judged, and fails, with the event.
+            return None
+
+    def _wants(self, number: int, event: StoredEvent) -> bool:
+        try:
+            return self._judge.matches(self._interests[number], event)
+        except ElmError as error:
+            raise RecognizerFailure(self._strand.recognizers[number].name, error) from error
 
     # Feeding
 
@@ -143,7 +158,7 @@ class Bench:
         """What the recognizers find when an event is fed to those that it is of interest to."""
         found: list[tuple[Result, int]] = []
         for number, sure in self._interest_in(fed.event.type):
-            if not sure and not self._judge.matches(self._interests[number], fed.event):
+            if not sure and not self._wants(number, fed.event):
                 continue
             count = self._tally.counts[number]
             count.fed += 1
@@ -165,7 +180,7 @@ class Bench:
             deadline = process.deadline()
             if deadline != self._deadlines.get(number):
                 self._set_deadline(number, deadline)
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise RecognizerFailure(self._strand.recognizers[number].name, error) from error
         finally:
             self._tally.took(number, perf_counter() - start)
@@ -186,10 +201,10 @@ class Bench:
         try:
             if not isinstance(emitted, Sequence) or isinstance(emitted, str):
                 raise InvalidValue(f"a process returns a sequence of Emissions, not {emitted!r:.80}")
-            if depth > SELF_FEEDING:
-                count.cut += len(emitted)
-                return []
             for emission in emitted:
+                if max(depth, depth_of(emission)) > SELF_FEEDING:
+                    count.cut += 1
+                    continue
                 result = result_of(recognizer, definition, emission, moment=moment, agent=self._agent)
                 found.append((result, depth))
         except Exception as error:

@@ -13,6 +13,8 @@ from elm.log import LogEntry, LogKind
 AHEAD = 60_000_000
 """Microseconds by which an event may end after its entry was written before it counts as dated in the future."""
 _MICROSECOND = timedelta(microseconds=1)
+LONGEST = timedelta(days=36_500)
+"""Longest lateness, and time until an agent is idle."""
 NEVER = -(2**62)
 """The watermark of an agent of which nothing is known."""
 
@@ -32,8 +34,11 @@ class Timing:
 
     def __post_init__(self) -> None:
         for name in ("lateness", "idle"):
-            if not isinstance(getattr(self, name), timedelta) or getattr(self, name) < timedelta(0):
-                raise InvalidValue(f"{name} is a timedelta, not negative, not {getattr(self, name)!r:.80}")
+            given = getattr(self, name)
+            if not isinstance(given, timedelta) or not timedelta(0) <= given <= LONGEST:
+                raise InvalidValue(f"{name} is a timedelta from 0 to {LONGEST.days:,} days, not {given!r:.80}")
+        if not isinstance(self.simulated, bool):
+            raise InvalidValue(f"simulated is True or False, not {self.simulated!r:.80}")
 
 
 @dataclass(slots=True, kw_only=True)
@@ -75,6 +80,9 @@ class Clocks:
         self.log_time = max(self.log_time, written)
         clock = self.agents.get(entry.agent)
         match entry.kind:
+            case LogKind.TICK if self.timing.simulated:
+                # Another consumer's, on the time of the wall.
+                return
             case LogKind.TICK:
                 assert entry.deadline is not None  # noqa: S101 - a tick has one
                 if clock is not None:
@@ -103,6 +111,10 @@ class Clocks:
         latest = max((clock.written for clock in self.agents.values()), default=NEVER)
         since = min(self.log_time - self.timing.idle // _MICROSECOND, latest)
         return {agent for agent, clock in self.agents.items() if clock.written >= since}
+
+    def idle_after(self, clock: Clock) -> int:
+        """The log time after which an agent is idle if nothing comes of it."""
+        return clock.written + self.timing.idle // _MICROSECOND
 
     def share(self) -> int:
         """The watermark across agents: the smallest of those that are not idle; it never goes back."""

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
+from elm.cues.algebra import Cue
 from elm.cues.codec import cue_from_json
 from elm.errors import DefinitionChanged, InvalidValue, UnknownType
 from elm.log import LoggedStore
 from elm.recognition.clocks import Timing
 from elm.recognition.strands import Strand, strands
 from elm.recognizers.base import Judge, Recognizer
+from elm.recognizers.purity import check_pure
 
 
 def enrolled(
@@ -32,6 +35,7 @@ def known_strands(store: LoggedStore, recognizers: Sequence[Recognizer], timing:
     if types:
         store.add_types(list(types.values()))
     for recognizer in recognizers:
+        check_pure(recognizer.interest, what=f"recognizer {recognizer.name!r}")
         try:
             for output in recognizer.outputs:
                 judge.of_type(recognizer.interest, output.name)
@@ -62,17 +66,49 @@ def refuse_changed(store: LoggedStore, found: Sequence[Strand]) -> None:
 
 def _refuse_rings(store: LoggedStore, recognizers: Sequence[Recognizer], consumer: str, judge: Judge) -> None:
     """Recognizers that feed each other share a consumer: else what they find would depend on who is faster."""
+    known = [
+        _Member(each.name, consumer, each.interest, tuple(output.name for output in each.outputs))
+        for each in recognizers
+    ]
     for other in store.log.consumers():
         owner = other.report.get("consumer")
-        if owner is None or owner == consumer:
-            continue
-        for told in other.report["recognizers"]:
-            interest = cue_from_json(told["interest"])
-            for mine in recognizers:
-                gives = any(judge.of_type(interest, output.name) is not False for output in mine.outputs)
-                takes = any(judge.of_type(mine.interest, name) is not False for name in told["outputs"])
-                if gives and takes:
-                    raise InvalidValue(
-                        f"recognizer {mine.name!r} and {told['name']!r} of consumer {owner!r} would feed each other: "
-                        f"let one consumer run both"
-                    )
+        if owner is not None and owner != consumer:
+            known += [
+                _Member(told["name"], owner, cue_from_json(told["interest"]), tuple(told["outputs"]))
+                for told in other.report["recognizers"]
+            ]
+    feeds = [
+        {
+            at
+            for at, fed in enumerate(known)
+            if any(judge.of_type(fed.interest, output) is not False for output in feeder.outputs)
+        }
+        for feeder in known
+    ]
+    for at, mine in enumerate(known[: len(recognizers)]):
+        for other_at in _reached(at, feeds):
+            if known[other_at].consumer != consumer and at in _reached(other_at, feeds):
+                raise InvalidValue(
+                    f"recognizer {mine.name!r} and {known[other_at].name!r} of consumer {known[other_at].consumer!r} "
+                    f"would feed each other: let one consumer run both"
+                )
+
+
+class _Member(NamedTuple):
+    """A recognizer of some consumer, as far as it matters who feeds whom."""
+
+    name: str
+    consumer: str
+    interest: Cue
+    outputs: tuple[str, ...]
+
+
+def _reached(start: int, feeds: Sequence[set[int]]) -> set[int]:
+    """Who is fed by one, directly or through others."""
+    found: set[int] = set()
+    waiting = [start]
+    while waiting:
+        fresh = feeds[waiting.pop()] - found
+        found |= fresh
+        waiting += fresh
+    return found

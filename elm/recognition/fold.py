@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from heapq import heappop, heappush
 from typing import Any
@@ -12,7 +12,7 @@ from elm.event import StoredEvent
 from elm.interval import from_micros, to_micros
 from elm.log import LogEntry, LogKind, Tick
 from elm.recognition.bench import Bench, RecognizerFailure, Tally
-from elm.recognition.clocks import Clocks, Timing
+from elm.recognition.clocks import NEVER, Clocks, Timing
 from elm.recognition.results import Result, moment_of
 from elm.recognition.strands import Strand
 from elm.recognizers.base import RECOGNIZER, Fed, Judge
@@ -77,11 +77,15 @@ class Waiting:
     def __init__(self, moments: list[int]) -> None:
         self.moments = moments
 
+    def passed(self, watermark: int) -> list[int]:
+        """The moments that still wait: those before the watermark do no longer."""
+        while self.moments and self.moments[0] < watermark:
+            heappop(self.moments)
+        return self.moments
+
     def has_room(self, moment: int, watermark: int) -> bool:
-        """Whether one more event may wait; those before the watermark wait no longer."""
-        moments = self.moments
-        while moments and moments[0] < watermark:
-            heappop(moments)
+        """Whether one more event may wait."""
+        moments = self.passed(watermark)
         if len(moments) >= MOST_HELD:
             return False
         heappush(moments, moment)
@@ -152,7 +156,6 @@ class Fold:
         if recognizer is None:
             self._accept(entry.agent, event, end, before, shared)
         elif recognizer not in self._own:
-            # Certain long after its end, perhaps: never late, and fed behind what has been fed.
             self._accept(entry.agent, event, end, before, shared, is_result=True)
 
     def _accept(
@@ -168,7 +171,8 @@ class Fold:
             _count_late(single)
         elif not self._has_room(self._waiting.setdefault(agent, Waiting([])), moment, before):
             _count_passed_over(single)
-        elif single:
+        elif single and (not is_result or agent in self.clocks.agents):
+            # What another consumer found across agents belongs to none whose time could come.
             _push(self._queues.setdefault(agent, []), event, moment)
         if not self._has_across:
             return
@@ -203,9 +207,9 @@ class Fold:
         while self._shared and self._shared[0][0] < watermark:
             fed = heappop(self._shared)[3]
             for work in self._wanted(fed.event.type)[1]:
-                self._work(work, work.across, fed)
+                self._found(work, lambda work=work, fed=fed: work.across.feed(fed))  # type: ignore[misc]
         for work in list(self.works.values()):
-            self._pass_time(work, work.across, watermark)
+            self._found(work, lambda work=work: work.across.pass_time(watermark))  # type: ignore[misc]
 
     def _settle_agent(self, agent: str | None) -> None:
         watermark = self.clocks.watermark(agent)
@@ -213,28 +217,19 @@ class Fold:
         while queue and queue[0][0] < watermark:
             fed = heappop(queue)[3]
             for work in self._wanted(fed.event.type)[0]:
-                if found := self._work(work, work.bench(agent), fed):
+                bench = work.bench(agent)
+                if found := self._found(work, lambda bench=bench, fed=fed: bench.feed(fed)):  # type: ignore[misc]
                     self._share(found)
         for work in list(self.works.values()):
-            bench = work.benches.get(agent)
-            if bench is not None:
-                self._share(self._pass_time(work, bench, watermark))
+            if (known := work.benches.get(agent)) is not None:
+                self._share(self._found(work, lambda bench=known: bench.pass_time(watermark)))  # type: ignore[misc]
 
-    def _work(self, work: Work, bench: Bench, fed: Fed) -> list[Result]:
+    def _found(self, work: Work, look: Callable[[], list[Result]]) -> list[Result]:
         try:
-            found = bench.feed(fed)
+            found = look()
         except RecognizerFailure as failure:
-            self._fail(work, failure)
-            return []
-        if found:
-            self._results += [(work.strand.name, result) for result in found]
-        return found
-
-    def _pass_time(self, work: Work, bench: Bench, watermark: int) -> list[Result]:
-        try:
-            found = bench.pass_time(watermark)
-        except RecognizerFailure as failure:
-            self._fail(work, failure)
+            self._failures.append((work.strand.name, failure))
+            self.remove(work.strand.name)
             return []
         if found:
             self._results += [(work.strand.name, result) for result in found]
@@ -253,16 +248,18 @@ class Fold:
                     result.fed.moment if self._complete else max(result.fed.moment, self.clocks.shared),
                 )
 
-    def _fail(self, work: Work, failure: RecognizerFailure) -> None:
-        self._failures.append((work.strand.name, failure))
-        self.remove(work.strand.name)
-
-    def remove(self, name: str) -> Work | None:
-        """Let go of a strand."""
-        work = self.works.pop(name, None)
+    def remove(self, name: str) -> None:
+        """Let go of a strand, and of what waits for it alone: it will be fed anew when it is back."""
+        if self.works.pop(name, None) is None:
+            return
         self._wants.clear()
         self._has_across = any(each.has_across for each in self.works.values())
-        return work
+        for queue in self._queues.values():
+            _keep(queue, lambda fed: bool(self._wanted(fed.event.type)[0]))
+        _keep(self._shared, lambda fed: bool(self._wanted(fed.event.type)[1]))
+        if not self._has_across:
+            self.clocks.shared = NEVER
+            self._waiting_across = Waiting([])
 
     # Time
 
@@ -270,12 +267,11 @@ class Fold:
         """The ticks that would make something certain if written `now`, and when the next one would be due."""
         found: list[Tick] = []
         later: list[int] = []
-        lateness = self.clocks.lateness
         if self.clocks.timing.simulated:
             return found, None
-        awake = self.clocks.awake()
+        lateness, awake, across = self.clocks.lateness, self.clocks.awake(), self._waits_across()
         for agent, clock in self.clocks.agents.items():
-            waiting = self._waits_for(agent) + (self._waits_across() if agent in awake else [])
+            waiting = self._waits_for(agent) + (across if agent in awake else [])
             waits = sorted(moment + lateness + 1 for moment in waiting if moment + lateness >= clock.time)
             reach = clock.after(now)
             due = [moment for moment in waits if moment <= reach]
@@ -283,6 +279,12 @@ class Fold:
                 found.append(Tick(agent=agent, deadline=from_micros(due[-1])))
             if len(due) < len(waits):
                 later.append(now + waits[len(due)] - reach)
+            if across and len(awake) > 1 and agent in awake:
+                # It holds others up until it is idle, which the log must tell: by a tick that moves no clock.
+                if (until_idle := self.clocks.idle_after(clock)) >= now:
+                    later.append(until_idle + 1)
+                elif not due:
+                    found.append(Tick(agent=agent, deadline=from_micros(clock.time)))
         return found, min(later, default=None)
 
     def _waits_for(self, agent: str | None) -> list[int]:
@@ -299,49 +301,72 @@ class Fold:
 
     # What is kept
 
-    def snapshot(self, name: str) -> tuple[Any, list[Fed]]:
+    def snapshot(self, name: str) -> tuple[Any, list[StoredEvent]]:
         """The state of one strand as plain JSON (clocks, what waits for it, its processes), and the events it names."""
         work = self.works[name]
-        held: dict[UUID, Fed] = {}
-        queues = []
-        for agent, queue in self._queues.items():
-            waiting = [item[3] for item in sorted(queue) if work.wants(item[3].event.type)]
-            queues.append([agent, [[str(fed.event.uid), fed.moment] for fed in waiting]])
-            held |= {fed.event.uid: fed for fed in waiting}
-        shared = [item[3] for item in sorted(self._shared) if work.wants_across(item[3].event.type)]
-        held |= {fed.event.uid: fed for fed in shared}
-        benches = [[agent, bench.snapshot()] for agent, bench in work.benches.items()]
-        for bench in (*work.benches.values(), work.across):
-            held |= {fed.event.uid: fed for fed in bench.held()}
-        return {
-            "clocks": self.clocks.snapshot(),
-            "queues": queues,
-            "shared": [[str(fed.event.uid), fed.moment] for fed in shared],
-            "benches": benches,
-            "across": work.across.snapshot(),
-            "waiting": [[agent, each.moments] for agent, each in self._waiting.items() if each.moments],
-            "waiting_across": self._waiting_across.moments,
-            "tally": work.tally.snapshot(),
-        }, list(held.values())
+        named: dict[UUID, StoredEvent] = {}
 
-    def resume(self, name: str, told: Any, held: dict[str, Fed]) -> None:
+        def told(held: Iterable[Fed]) -> list[tuple[str, int]]:
+            # With its moment each time: across agents an event may be certain later than for its own agent.
+            found = []
+            for fed in held:
+                named[fed.event.uid] = fed.event
+                found.append((str(fed.event.uid), fed.moment))
+            return found
+
+        queues = [(agent, [item[3] for item in sorted(queue)]) for agent, queue in self._queues.items()]
+        state = {
+            "clocks": self.clocks.snapshot(),
+            "queues": [
+                (agent, told(fed for fed in queue if work.wants(fed.event.type))) for agent, queue in queues if queue
+            ],
+            "shared": told(item[3] for item in sorted(self._shared) if work.wants_across(item[3].event.type)),
+            "benches": [(agent, bench.snapshot(), told(bench.held())) for agent, bench in work.benches.items()],
+            "across": (work.across.snapshot(), told(work.across.held())),
+            "waiting": [
+                (agent, moments)
+                for agent, each in self._waiting.items()
+                if (moments := each.passed(self.clocks.watermark(agent)))
+            ],
+            "waiting_across": self._waiting_across.passed(self.clocks.shared),
+            "tally": work.tally.snapshot(),
+        }
+        return state, list(named.values())
+
+    def resume(self, name: str, told: Any, named: Mapping[str, StoredEvent]) -> None:
         """Have a strand, the only one here, in the state of which a snapshot was taken."""
         work = self.works[name]
         self.clocks = Clocks.resumed(self.clocks.timing, told["clocks"])
-        self._queues = {agent: [_item(held[uid], moment) for uid, moment in queue] for agent, queue in told["queues"]}
-        self._shared = [_item(held[uid], moment) for uid, moment in told["shared"]]
-        for agent, states in told["benches"]:
-            work.bench(agent).resume(states, held)
-        work.across.resume(told["across"], held)
+        for agent, waiting in told["queues"]:
+            for uid, moment in waiting:
+                _push(self._queues.setdefault(agent, []), named[uid], moment)
+        for uid, moment in told["shared"]:
+            _push(self._shared, named[uid], moment)
+        for agent, states, held in told["benches"]:
+            work.bench(agent).resume(states, {uid: _fed(named[uid], moment) for uid, moment in held})
+        states, held = told["across"]
+        work.across.resume(states, {uid: _fed(named[uid], moment) for uid, moment in held})
         self._waiting = {agent: Waiting(moments) for agent, moments in told["waiting"]}
         self._waiting_across = Waiting(told["waiting_across"])
         work.tally.resume(told["tally"])
 
+    def may_adopt(self, other: Fold) -> bool:
+        """Whether both have come to know the same, so that what they find does not depend on who keeps it."""
+        if self.clocks.agents != other.clocks.agents or self.clocks.log_time != other.clocks.log_time:
+            return False
+        if self._has_across and other._has_across and self.clocks.shared != other.clocks.shared:
+            return False
+        return self._still_waiting() == other._still_waiting()
+
+    def _still_waiting(self) -> dict[str | None, list[int]]:
+        passed = {agent: each.passed(self.clocks.watermark(agent)) for agent, each in self._waiting.items()}
+        return {agent: sorted(moments) for agent, moments in passed.items() if moments}
+
     def adopt(self, other: Fold) -> None:
-        """Take over the strands of a fold that is at the same position."""
+        """Take over the strands of a fold that knows the same."""
         self.works |= other.works
         self._wants.clear()
-        if other._has_across:
+        if other._has_across and not self._has_across:
             self._has_across = True
             self.clocks.shared = other.clocks.shared
             self._waiting_across = other._waiting_across
@@ -351,12 +376,17 @@ class Fold:
 
 
 def _push(queue: _Queue, event: StoredEvent, moment: int) -> None:
-    begin = to_micros(event.interval.begin)
-    heappush(queue, (moment, begin, event.uid.int, Fed(event=event, moment=moment, begin=begin)))
+    fed = _fed(event, moment)
+    heappush(queue, (moment, fed.begin, event.uid.int, fed))
 
 
-def _item(fed: Fed, moment: int) -> tuple[int, int, int, Fed]:
-    return moment, fed.begin, fed.event.uid.int, Fed(event=fed.event, moment=moment, begin=fed.begin)
+def _fed(event: StoredEvent, moment: int) -> Fed:
+    return Fed(event=event, moment=moment, begin=to_micros(event.interval.begin))
+
+
+def _keep(queue: _Queue, is_wanted: Callable[[Fed], bool]) -> None:
+    # What is sorted is a heap.
+    queue[:] = sorted(item for item in queue if is_wanted(item[3]))
 
 
 def _merge(into: _Queue, queue: _Queue) -> None:

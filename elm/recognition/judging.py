@@ -28,9 +28,11 @@ class TypeJudge:
         try:
             return self._taxonomy.is_a(name, ancestor)
         except UnknownType:
-            self._taxonomy = Taxonomy()
-            self._taxonomy.add(self._types())
-            return self._taxonomy.is_a(name, ancestor)
+            # Made ready before it is used: other threads ask meanwhile.
+            taxonomy = Taxonomy()
+            taxonomy.add(self._types())
+            self._taxonomy = taxonomy
+            return taxonomy.is_a(name, ancestor)
 
     def of_type(self, cue: Cue, type_name: str) -> bool | None:
         """Whether every event of this type matches, none does, or it depends: logic of three values."""

@@ -7,6 +7,7 @@ import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
+from dataclasses import replace
 from datetime import UTC, datetime
 from threading import Event as Signal
 from threading import Thread
@@ -20,16 +21,17 @@ from elm.errors import (
     InvalidValue,
     PositionLost,
     StoreClosed,
+    UnknownConsumer,
     UnknownEvent,
     UnknownType,
 )
 from elm.interval import to_micros
-from elm.log import LoggedStore, Step
+from elm.log import LogEntry, LoggedStore, Step
 from elm.recognition import checkpoint
 from elm.recognition.bench import RecognizerFailure
 from elm.recognition.clocks import Timing
 from elm.recognition.enrolment import enrolled
-from elm.recognition.fold import Fold, Work
+from elm.recognition.fold import Fold, Taken, Work
 from elm.recognition.judging import TypeJudge
 from elm.recognition.results import Result
 from elm.recognition.status import Failures, RecognizerStatus, report_of, report_of_failure, status
@@ -50,6 +52,8 @@ RETRY_FIRST, RETRY_MOST = 0.5, 60.0
 """Seconds until a failed strand is tried again: doubled with every failure, up to the second."""
 SLOW = 1.0
 """Seconds in one call from which a strand goes on in a thread of its own: others need not wait for it."""
+ERROR_SHOWN = 1_000
+"""Characters of an error that a status keeps."""
 LARGE = 256 * 1024
 """Bytes from which a checkpoint is not taken with every batch but with every `LARGE_EVERY`-th."""
 LARGE_EVERY = 16
@@ -69,7 +73,7 @@ class _Lane:
         self.batches = 0
         self.at_once: int | None = None
         """Entries of a batch, where a slow strand goes by itself: few, to be stopped and heard of soon."""
-        self.at_work: Future[int] | None = None
+        self.at_work: Future[tuple[list[LogEntry], Taken]] | None = None
 
     @property
     def is_slow(self) -> bool:
@@ -103,7 +107,10 @@ class RecognitionManager:
         batch: int = BATCH,
     ) -> None:
         self.consumer = check_short_name(consumer, what="the name of a consumer")
-        self.timing = timing or Timing()
+        self.timing = Timing() if timing is None else timing
+        if not isinstance(self.timing, Timing):
+            raise InvalidValue(f"timing is given as Timing(lateness=..., idle=...), not {timing!r:.80}")
+        _check_recognizers(recognizers)
         if isinstance(batch, bool) or not isinstance(batch, int) or batch < 1:
             raise InvalidValue(f"a batch has at least one entry, not {batch!r}")
         self._store = store
@@ -119,7 +126,7 @@ class RecognitionManager:
         self._pool: ThreadPoolExecutor | None = None
         self._stop = Signal()
         self._thread: Thread | None = None
-        self._broke: Exception | None = None
+        self._broke: BaseException | None = None
 
     # Running
 
@@ -138,6 +145,8 @@ class RecognitionManager:
     def run(self, stop: Signal | None = None) -> None:
         """Deal with the log as it grows, until `stop` is set (or `stop()` called); outlives a server's restart."""
         asked = stop or self._stop
+        if stop is None:
+            self._stop.clear()
         pause = RETRY_FIRST
         while not asked.is_set():
             try:
@@ -146,8 +155,9 @@ class RecognitionManager:
                         if self._round() == 0:
                             self._wait(asked)
                         pause = RETRY_FIRST
-            except DatabaseUnreachable as error:
-                log.warning("recognition %r goes on when there is a server again: %s", self.consumer, error)
+            except (DatabaseUnreachable, PositionLost, UnknownConsumer) as error:
+                # The server is away, or somebody rewound a consumer: it goes on from what is committed.
+                log.warning("recognition %r begins anew where it was, when it can: %s", self.consumer, error)
                 asked.wait(pause)
                 pause = min(2 * pause, RETRY_MOST)
             finally:
@@ -164,7 +174,7 @@ class RecognitionManager:
         self._thread.start()
 
     def stop(self) -> None:
-        """End the thread after the batch it is at; what broke it, if something did, is raised here."""
+        """End the thread after the batch it is at, however long a call takes; what broke it is raised here."""
         self._stop.set()
         if self._thread is not None:
             self._thread.join()
@@ -196,7 +206,7 @@ class RecognitionManager:
             self.run(self._stop)
         except StoreClosed:
             log.info("recognition %r ends: the memory was closed", self.consumer)
-        except Exception as error:
+        except BaseException as error:
             log.exception("recognition %r stopped", self.consumer)
             self._broke = error
 
@@ -259,16 +269,19 @@ class RecognitionManager:
         return self._lanes[-1]
 
     def _join_lanes(self) -> None:
-        """Strands that have come to one position go on together, but for slow ones."""
-        first: dict[int, _Lane] = {}
+        """Strands that have come to one position, and know the same, go on together, but for slow ones."""
+        first: dict[int, list[_Lane]] = {}
         for lane in [*self._lanes]:
-            if lane.is_slow:
+            if lane.is_slow or lane.at_work is not None:
                 continue
-            known = first.setdefault(lane.position, lane)
-            if known is not lane:
-                known.fold.adopt(lane.fold)
-                known.checkpoint_bytes |= lane.checkpoint_bytes
-                self._lanes.remove(lane)
+            here = first.setdefault(lane.position, [])
+            known = next((each for each in here if each.fold.may_adopt(lane.fold)), None)
+            if known is None:
+                here.append(lane)
+                continue
+            known.fold.adopt(lane.fold)
+            known.checkpoint_bytes |= lane.checkpoint_bytes
+            self._lanes.remove(lane)
 
     # Working
 
@@ -278,28 +291,31 @@ class RecognitionManager:
         head = self._store.log.head()
         done = 0
         for lane in [*self._lanes]:
-            if lane.position >= head or lane.is_busy:
+            if lane.is_busy:
                 continue
             if lane.at_work is not None:
-                lane.at_work.result()
-            if lane.is_slow and self._pool is not None:
-                lane.at_work = self._pool.submit(self._advance, lane)
-            else:
-                done += self._advance(lane)
+                # Only this thread commits and decides who goes on; the other one has fed a slow strand for it.
+                at_work, lane.at_work = lane.at_work, None
+                done += self._finish(lane, *at_work.result())
+            elif lane.position < head:
+                if lane.is_slow and self._pool is not None:
+                    lane.at_work = self._pool.submit(self._taken, lane)
+                else:
+                    done += self._finish(lane, *self._taken(lane))
         self._join_lanes()
         return done
 
-    def _advance(self, lane: _Lane) -> int:
+    def _taken(self, lane: _Lane) -> tuple[list[LogEntry], Taken]:
         entries = self._store.log.read(lane.position, lane.at_once or self._batch)
-        if not entries:
-            return 0
-        taken = lane.fold.take(entries)
+        return entries, lane.fold.take(entries)
+
+    def _finish(self, lane: _Lane, entries: Sequence[LogEntry], taken: Taken) -> int:
         for name, failure in taken.failures:
             self._fail(self._strands[name], failure)
-        if lane.fold.works:
-            self._commit(lane, entries[-1].position, taken.results)
-        else:
+        if not lane.fold.works:
             self._lanes.remove(lane)
+        elif entries:
+            self._commit(lane, entries[-1].position, taken.results)
         return len(entries)
 
     def _commit(self, lane: _Lane, position: int, results: Sequence[tuple[str, Result]]) -> None:
@@ -322,9 +338,11 @@ class RecognitionManager:
             for name in [*lane.fold.works]:
                 own = self._enter(self._strands[name])
                 if own is not None:
-                    self._advance(own)
+                    self._finish(own, *self._taken(own))
             return
         lane.position = position
+        for name in lane.fold.works.keys() & self._failures.keys():
+            self._failures[name] = replace(self._failures[name], in_a_row=0)
         self._set_slow_aside(lane)
 
     def _steps(self, lane: _Lane, position: int) -> list[Step]:
@@ -367,11 +385,14 @@ class RecognitionManager:
     # Failing
 
     def _fail(self, strand: Strand, error: Exception) -> None:
-        known = self._failures.get(strand.name)
-        failures = Failures(count=known.count + 1 if known else 1, error=f"{error}")
+        known = self._failures.get(strand.name, Failures())
+        # A file's name, say, may hold what is no text.
+        said = f"{error}".encode("utf-8", "backslashreplace").decode()[:ERROR_SHOWN]
+        failures = Failures(count=known.count + 1, in_a_row=known.in_a_row + 1, error=said)
         self._failures[strand.name] = failures
-        self._retry_at[strand.name] = time.monotonic() + min(RETRY_FIRST * 2 ** min(failures.count - 1, 10), RETRY_MOST)
-        log.warning("recognition %r: %r failed (%d): %s", self.consumer, strand.name, failures.count, error)
+        pause = min(RETRY_FIRST * 2 ** min(failures.in_a_row - 1, 10), RETRY_MOST)
+        self._retry_at[strand.name] = time.monotonic() + pause
+        log.warning("recognition %r: %r failed (%d): %s", self.consumer, strand.name, failures.count, said)
         consumer = self._store.log.consumer(self._named(strand.name))
         if consumer is not None:
             report = report_of_failure(consumer.report, failures)
@@ -407,3 +428,11 @@ class RecognitionManager:
             self._store.log.wait(min(lane.position for lane in idle), seconds)
         else:
             asked.wait(min(seconds, GLANCE))
+
+
+def _check_recognizers(recognizers: Sequence[Recognizer]) -> None:
+    if isinstance(recognizers, str) or not isinstance(recognizers, Sequence) or not recognizers:
+        raise InvalidValue(f"recognition needs a list of recognizers, at least one, not {recognizers!r:.80}")
+    for each in recognizers:
+        if isinstance(each, type) or not isinstance(each, Recognizer):
+            raise InvalidValue(f"this is no recognizer (see elm.recognizers.Recognizer): {each!r:.80}")

@@ -57,6 +57,8 @@ def replay(
     works = [Work(strand, judge) for strand in strands]
     fold = Fold(works, timing, frozenset(each.name for each in recognizers), complete=complete)
     head, position = store.log.head(), since
+    if isinstance(since, bool) or not isinstance(since, int) or not 0 <= since <= head:
+        raise InvalidValue(f"a replay begins behind a position of the log, 0 to {head:,}, not {since!r}")
     found: list[UUID] = []
     new: list[UUID] = []
     while position < head:

@@ -16,7 +16,7 @@ from elm.event import Event, StoredEvent
 from elm.features import Feature, kind_of, value_text
 from elm.geometry import derived_region
 from elm.interval import Interval, from_micros, to_micros
-from elm.recognizers.base import DEADLINE, OUTPUT, RECOGNIZER, VERSION, Emission, Fed, Recognizer
+from elm.recognizers.base import DEADLINE, DEPTH, OUTPUT, RECOGNIZER, VERSION, Emission, Fed, Recognizer
 
 DEADLINE_STEP = "deadline"
 """The step of the part that says when a time was over."""
@@ -43,6 +43,7 @@ def result_of(recognizer: Recognizer, definition: str, emission: Emission, *, mo
         (RECOGNIZER, recognizer.name),
         (VERSION, recognizer.version),
         (OUTPUT, emission.output),
+        (DEPTH, depth_of(emission)),
     ]
     steps = [(step, part.uid) for step, part in emission.parts]
     parts = [part for _, part in emission.parts]
@@ -75,6 +76,14 @@ def result_of(recognizer: Recognizer, definition: str, emission: Emission, *, mo
     events.append(whole)
     stored = StoredEvent.of_row((whole, parts, moment), _DERIVED)
     return Result(events=tuple(events), fed=Fed(event=stored, moment=moment, begin=to_micros(stored.interval.begin)))
+
+
+def depth_of(emission: Emission) -> int:
+    """How many layers of recognition make an emission: one more than the deepest of its parts."""
+    if not isinstance(emission, Emission):
+        return 1
+    depths = [value for _, part in emission.parts for value in part.values(DEPTH) if isinstance(value, int)]
+    return 1 + max(depths, default=0)
 
 
 def _uid(told: Sequence[Any]) -> UUID:
@@ -136,8 +145,3 @@ def moment_of(event: StoredEvent) -> int:
     if end is None:
         raise InvalidValue(f"event {event.uid} is still going on: it is fed when it has ended")
     return to_micros(end)
-
-
-def deadline_text(moment: int) -> str:
-    """A moment, for a status."""
-    return from_micros(moment).isoformat()

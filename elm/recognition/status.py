@@ -18,10 +18,11 @@ SHOWN = 100
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Failures:
-    """How often a strand has failed, and what of the last time."""
+    """How often a strand has failed, how often since it last did anything, and of what the last time."""
 
-    count: int
-    error: str
+    count: int = 0
+    in_a_row: int = 0
+    error: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,7 +79,7 @@ def report_of(work: Work, consumer: str, clocks: Clocks, failures: Failures | No
                 "split": counts[name].get("split", 0),
             }
         )
-    watermarks = {agent or "": from_micros(clocks.watermark(agent)).isoformat() for agent in [*clocks.agents][:SHOWN]}
+    watermarks = {agent or "": _shown(clocks.watermark(agent)) for agent in [*clocks.agents][:SHOWN]}
     report: dict[str, Any] = {
         "consumer": consumer,
         "recognizers": recognizers,
@@ -90,6 +91,14 @@ def report_of(work: Work, consumer: str, clocks: Clocks, failures: Failures | No
     if failures is not None:
         report |= {"failures": failures.count, "error": failures.error}
     return report
+
+
+def _shown(moment: int) -> str | None:
+    try:
+        return from_micros(moment).isoformat()
+    except OverflowError:
+        # Events of the year 1 leave watermarks before it.
+        return None
 
 
 def report_of_failure(known: Mapping[str, Any], failures: Failures) -> dict[str, Any]:

@@ -20,7 +20,7 @@ from elm.text import check_name, check_short_name
 
 DEADLINE = EventType(name="elm.Deadline")
 """Type of the instants at which a time was over: they bound results that are certain because nothing came."""
-RECOGNIZER, VERSION, OUTPUT = "elm.recognizer", "elm.version", "elm.output"
+RECOGNIZER, VERSION, OUTPUT, DEPTH = "elm.recognizer", "elm.version", "elm.output", "elm.depth"
 """Features that every recognized event carries."""
 
 
@@ -143,6 +143,23 @@ def fingerprint(recognizer: Recognizer) -> str:
     """A hash of all that a recognizer's results depend on."""
     told = [recognizer.name, recognizer.version, recognizer.across_agents, recognizer.definition]
     return hashlib.sha256(msgspec.json.encode(told, order="sorted")).hexdigest()
+
+
+MOST_COUNT = 1_000_000
+"""Greatest bound that a definition may set itself."""
+
+
+def check_count(count: int, *, what: str, least: int = 1) -> None:
+    """Refuse what is no number from `least` on, or one beyond every bound."""
+    if isinstance(count, bool) or not isinstance(count, int) or not least <= count <= MOST_COUNT:
+        raise InvalidValue(f"{what} is a number from {least:,} to {MOST_COUNT:,}, not {count!r:.80}")
+
+
+def check_feature(name: str, *, what: str) -> str:
+    """The name of a feature that a definition gives its results: none that every recognized event carries."""
+    if check_name(name, what=what) in (RECOGNIZER, VERSION, OUTPUT, DEPTH):
+        raise InvalidValue(f"{what} cannot be {name!r}, which every recognized event carries: give it another name")
+    return name
 
 
 def check_identity(name: str, version: int) -> None:

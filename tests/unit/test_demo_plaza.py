@@ -31,7 +31,7 @@ from elm.errors import MissingPackage
 from elm.event import Event, StoredEvent, content_hash
 from elm.geometry import Region
 from elm.interval import Interval
-from elm.recognizers.base import OUTPUT, RECOGNIZER, VERSION
+from elm.recognizers.base import DEPTH, OUTPUT, RECOGNIZER, VERSION
 from elm.storage.memory import MemoryStore
 from tests.unit import mower_episodes
 
@@ -341,7 +341,7 @@ def test_rows_are_as_defined(runs: dict[str, Lived], name: str) -> None:
         assert breaks
 
 
-MARKS = {RECOGNIZER, VERSION, OUTPUT}
+MARKS = {RECOGNIZER, VERSION, OUTPUT, DEPTH}
 
 
 def _told(events: Sequence[Event], names: dict[UUID, str]) -> list[object]:
