@@ -37,8 +37,10 @@ def subscribe(
     next subscription of that name goes on from there; `since` is where a new one begins. After a crash the
     last page comes again. Two subscriptions of one name at once are refused with `ConsumerBusy`.
     """
-    if timeout is not None and not timeout >= 0:
+    if timeout is not None and (isinstance(timeout, bool) or not isinstance(timeout, int | float) or not timeout >= 0):
         raise InvalidValue(f"the timeout of a subscription is a number of seconds, or None for no end, not {timeout!r}")
+    if cue is not None and not isinstance(cue, Cue):
+        raise InvalidValue(f"a subscription looks for what a cue (elm.cues) says, not for {cue!r:.80}")
     wanted = And() if cue is None else cue
     # A cue that cannot be answered is refused here, not when the first event comes.
     for _ in store.ids(Query(cue=wanted, limit=0)):

@@ -65,6 +65,10 @@ class Same(Condition):
 
     feature: str
 
+    def __post_init__(self) -> None:
+        Condition.__post_init__(self)
+        check_name(self.feature, what="a feature that a condition compares")
+
     def between(self, event: StoredEvent, other: StoredEvent) -> bool:
         """Whether both have a value in common."""
         ours = {identity((self.feature, value)) for value in event.values(self.feature)}
@@ -178,22 +182,22 @@ class Told(Condition):
 
 def same(feature: str, step: str, *, of: OfName = Of.LAST) -> Condition:
     """Both have the feature, and some value of it in common."""
-    return Same(feature=feature, step=step, of=Of(of))
+    return Same(feature=feature, step=step, of=_of(of))
 
 
 def allen(relation: AllenRelation | str, step: str, *, of: OfName = Of.LAST) -> Condition:
     """The event at hand stands in this relation of Allen's to what the step took."""
-    return Allen(relation=named(relation, AllenRelation, what="the relation of a condition"), step=step, of=Of(of))
+    return Allen(relation=named(relation, AllenRelation, what="the relation of a condition"), step=step, of=_of(of))
 
 
 def near(metres: float, step: str, *, place: PlaceName = Place.REGION, of: OfName = Of.LAST) -> Condition:
     """At most so many metres lie between the regions (or subjects)."""
-    return Near(metres=metres, step=step, place=Place(place), of=Of(of))
+    return Near(metres=metres, step=step, place=_placed(place), of=_of(of))
 
 
 def same_region(step: str, *, place: PlaceName = Place.REGION, of: OfName = Of.LAST) -> Condition:
     """The regions (or subjects) share at least a point."""
-    return SameRegion(step=step, place=Place(place), of=Of(of))
+    return SameRegion(step=step, place=_placed(place), of=_of(of))
 
 
 def compare(
@@ -202,14 +206,22 @@ def compare(
     """The event's feature compares so with that of what the step took (with its `other_feature`, if given)."""
     relation = named(comparison, Comparison, what="the comparison of a condition")
     other = feature if other_feature is None else other_feature
-    return Compare(feature=feature, comparison=relation, step=step, other_feature=other, of=Of(of))
+    return Compare(feature=feature, comparison=relation, step=step, other_feature=other, of=_of(of))
 
 
 def told(
     title: str, function: Callable[[StoredEvent, StoredEvent], bool], step: str, *, of: OfName = Of.LAST
 ) -> Condition:
     """What a pure function of the event at hand and the one taken says; `title` changes when the function does."""
-    return Told(title=title, function=function, step=step, of=Of(of))
+    return Told(title=title, function=function, step=step, of=_of(of))
+
+
+def _of(given: OfName) -> Of:
+    return named(given, Of, what="which event of a step a condition means")
+
+
+def _placed(given: PlaceName) -> Place:
+    return named(given, Place, what="the place of a condition")
 
 
 def _place(event: StoredEvent, place: Place) -> Region | None:

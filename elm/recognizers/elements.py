@@ -10,6 +10,7 @@ from typing import Self
 from elm.cues.algebra import Cue, named
 from elm.errors import InvalidValue
 from elm.recognizers.conditions import Condition
+from elm.recognizers.durations import check_duration
 from elm.recognizers.purity import check_pure
 from elm.text import check_name
 
@@ -157,9 +158,3 @@ def _check_conditions(conditions: tuple[Condition, ...], *, what: str) -> None:
     for each in conditions:
         if not isinstance(each, Condition):
             raise InvalidValue(f"the conditions of {what} are made by same, allen, near ...: not {each!r:.80}")
-
-
-def check_duration(duration: timedelta, *, what: str) -> None:
-    """Refuse what is no stretch of time, or a negative one."""
-    if not isinstance(duration, timedelta) or duration < timedelta(0):
-        raise InvalidValue(f"{what} is a timedelta, not negative, not {duration!r:.80}")

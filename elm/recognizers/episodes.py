@@ -11,22 +11,13 @@ from typing import Any, ClassVar, Literal
 from elm.cues.algebra import Cue, Or, named
 from elm.errors import InvalidValue
 from elm.interval import from_micros
-from elm.recognizers.base import DEADLINE, Emission, Fed, Judge, Process
+from elm.recognizers.base import DEADLINE, Emission, Fed, Judge, Process, check_feature
 from elm.recognizers.conditions import Same
-from elm.recognizers.elements import check_duration
-from elm.recognizers.grouped import (
-    MOST_PARTS,
-    Group,
-    Grouped,
-    GroupedProcess,
-    alike,
-    keep_names,
-    later,
-    micros_of,
-)
+from elm.recognizers.durations import check_duration, later, micros_of
+from elm.recognizers.grouped import MOST_PARTS, Group, Grouped, GroupedProcess, alike
+from elm.recognizers.naming import sorted_names
 from elm.recognizers.partition import Key, values_of
 from elm.taxonomy import EventType
-from elm.text import check_name
 
 DAY = "day"
 _DAY_MICROS = 86_400 * 10**6
@@ -84,10 +75,12 @@ class _Sessions(GroupedProcess[Session]):
             found, group = self._over(group), None
         if group is None:
             group = Group(key, (), deadline, [])
-        group.held.append(fed)
-        group.deadline = deadline
+        group.add(fed, deadline)
         self._put(group)
         return found
+
+    def _tells(self, group: Group) -> bool:
+        return len(group.held) >= self._definition.least
 
     def _over(self, group: Group) -> Sequence[Emission]:
         if len(group.held) < self._definition.least:
@@ -123,9 +116,10 @@ class Mission(Grouped):
         self._check_durations("within")
         self._check_types(self.timed_out)
         if self.outcome is not None:
-            check_name(self.outcome, what=f"the outcome of {self.title}")
+            check_feature(self.outcome, what=f"the outcome of {self.title}")
             self._reserve(self.outcome)
-        keep_names(self, "same", what=f"what begin and end of {self.title} have in common")
+        same = sorted_names(self.same, what=f"what begin and end of {self.title} have in common")
+        object.__setattr__(self, "same", same)
         object.__setattr__(self, "again", named(self.again, Again, what=f"what a second begin does to {self.title}"))
         self._check_count("most_parts", least=2)
 
@@ -173,6 +167,9 @@ class _Missions(GroupedProcess[Mission]):
             return False
         begun = group.held[0].event
         return all(Same(feature=name, step=_BEGIN).between(fed.event, begun) for name in self._definition.same)
+
+    def _tells(self, group: Group) -> bool:
+        return self._definition.timed_out is not None
 
     def _over(self, group: Group) -> Sequence[Emission]:
         timed_out = self._definition.timed_out
@@ -256,6 +253,9 @@ class _Repetitions(GroupedProcess[Repetition]):
         parts = alike(held)
         features = self._definition.measured(parts)
         return (Emission(type=self._definition.type, parts=parts, key=values_of(key), features=features),)
+
+    def _tells(self, group: Group) -> bool:
+        return False
 
     def _over(self, group: Group) -> Sequence[Emission]:
         return ()

@@ -4,34 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from datetime import UTC, datetime, timedelta
 from typing import Any, ClassVar, Generic, Self, TypeVar
 
 from elm.cues.algebra import Cue
 from elm.errors import InvalidValue
 from elm.event import StoredEvent
 from elm.features import Feature
-from elm.interval import to_micros
-from elm.recognizers.base import Emission, Fed, Judge, check_identity
-from elm.recognizers.elements import MOST_TAKEN, check_duration
-from elm.recognizers.measures import Measure
+from elm.recognizers.base import Emission, Fed, Judge, check_count, check_identity
+from elm.recognizers.durations import check_duration
+from elm.recognizers.elements import MOST_TAKEN
+from elm.recognizers.measures import Measure, checked_measures
+from elm.recognizers.naming import ordered_names, parents_of
 from elm.recognizers.partition import Key, keys_of
 from elm.recognizers.purity import check_pure
 from elm.recognizers.spelling import plain
 from elm.taxonomy import EventType
-from elm.text import check_name, check_short_name
+from elm.text import check_short_name
 
 MOST_GROUPS = 10_000
 """Groups that one process holds, unless its definition says otherwise."""
 MOST_PARTS = MOST_TAKEN
 """Events that one result is made of, unless its definition says otherwise."""
-MOST_COUNT = 1_000_000
-"""Greatest bound that a definition may set itself."""
 EVENT = "event"
 """The step of parts that all play the same role."""
-
-_MICROSECOND = timedelta(microseconds=1)
-_LATEST = to_micros(datetime.max.replace(tzinfo=UTC))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,18 +50,9 @@ class Grouped:
     def __post_init__(self) -> None:
         check_identity(self.name, self.version)
         self._check_types(self.type)
-        keep_names(self, "partition", what=f"the partition of {self.title}")
-        if isinstance(self.parents, str):
-            raise InvalidValue(f"the parents of the types of {self.title} are several names: [{self.parents!r}]")
-        object.__setattr__(self, "parents", EventType(name=self.type, parents=tuple(self.parents)).parents)
-        object.__setattr__(self, "measures", dict(self.measures))
-        for name, measure in self.measures.items():
-            check_name(name, what=f"a measure of {self.title}")
-            if not isinstance(measure, Measure):
-                raise InvalidValue(f"{self.title} measures by count(), mean(...) and the like, not by {measure!r:.80}")
-            if measure.step is not None and measure.step not in self.STEPS:
-                steps = ", ".join(map(repr, self.STEPS))
-                raise InvalidValue(f"{self.title} measures step {measure.step!r}; its steps are {steps}")
+        object.__setattr__(self, "partition", ordered_names(self.partition, what=f"the partition of {self.title}"))
+        object.__setattr__(self, "parents", parents_of(self.type, self.parents))
+        object.__setattr__(self, "measures", checked_measures(self.measures, self.STEPS, what=self.title))
         self._check_count("most_groups")
 
     @property
@@ -99,8 +85,6 @@ class Grouped:
 
     def _check_cues(self, *cues: Cue) -> None:
         for cue in cues:
-            if not isinstance(cue, Cue):
-                raise InvalidValue(f"{self.title} needs a cue (elm.cues), not {cue!r:.80}")
             check_pure(cue, what=self.title)
 
     def _check_durations(self, *fields: str) -> None:
@@ -108,34 +92,11 @@ class Grouped:
             check_duration(getattr(self, name), what=f"{name!r} of {self.title}")
 
     def _check_count(self, name: str, *, least: int = 1) -> None:
-        count = getattr(self, name)
-        if isinstance(count, bool) or not isinstance(count, int) or not least <= count <= MOST_COUNT:
-            raise InvalidValue(
-                f"{name!r} of {self.title} is a number from {least:,} to {MOST_COUNT:,}, not {count!r:.80}"
-            )
+        check_count(getattr(self, name), what=f"{name!r} of {self.title}", least=least)
 
     def _reserve(self, feature: str) -> None:
         if feature in self.measures:
             raise InvalidValue(f"the feature {feature!r} of {self.title} is no measure: give the measure another name")
-
-
-def keep_names(definition: object, field_name: str, *, what: str) -> None:
-    """Keep a definition's feature names as a tuple of them, each once."""
-    given = getattr(definition, field_name)
-    if isinstance(given, str):
-        raise InvalidValue(f"{what} is several feature names: [{given!r}]")
-    names = dict.fromkeys(check_name(name, what=f"a feature of {what}") for name in given)
-    object.__setattr__(definition, field_name, tuple(names))
-
-
-def micros_of(duration: timedelta) -> int:
-    """A duration in microseconds, exactly."""
-    return duration // _MICROSECOND
-
-
-def later(moment: int, micros: int) -> int:
-    """`micros` after a moment, but no later than a datetime can say: time never passes beyond that."""
-    return min(moment + micros, _LATEST)
 
 
 @dataclass(slots=True)
@@ -146,6 +107,23 @@ class Group:
     tag: tuple[str, ...]
     deadline: int
     held: list[Fed]
+    _bounds: tuple[int, int] | None = None
+
+    @property
+    def span(self) -> int:
+        """From the least begin to the greatest end of its events, in microseconds."""
+        if self._bounds is None:
+            ends = [fed.event.interval.micros[1] for fed in self.held]
+            self._bounds = min(fed.begin for fed in self.held), max(ends)
+        return self._bounds[1] - self._bounds[0]
+
+    def add(self, fed: Fed, deadline: int) -> None:
+        """Hold one more event, until another moment."""
+        if self._bounds is not None:
+            begin, end = self._bounds
+            self._bounds = min(begin, fed.begin), max(end, fed.event.interval.micros[1])
+        self.held.append(fed)
+        self.deadline = deadline
 
 
 Definition = TypeVar("Definition", bound=Grouped)
@@ -164,6 +142,8 @@ class GroupedProcess(Generic[Definition]):
         self._around = around
         self._partition = tuple(definition.partition)
         self._groups: dict[tuple[Key, tuple[str, ...]], Group] = {}
+        self._telling: dict[tuple[Key, tuple[str, ...]], Group] = {}
+        """Those of the groups, in their order, of which something is told when their time is over."""
         self._dropped = 0
         self._split = 0
 
@@ -179,14 +159,15 @@ class GroupedProcess(Generic[Definition]):
 
     def feed(self, fed: Fed) -> Sequence[Emission]:
         """Take in an event, in each of its groups."""
+        self._forget(fed.moment)
         found: list[Emission] = []
         for key in keys_of(fed.event, self._partition):
             found += self._take(key, fed)
         return found or ()
 
     def deadline(self) -> int | None:
-        """The moment at which the first group's time is over."""
-        for group in self._groups.values():
+        """The moment at which the time of the first group is over of which something is told then."""
+        for group in self._telling.values():
             return group.deadline
         return None
 
@@ -194,10 +175,19 @@ class GroupedProcess(Generic[Definition]):
         """Time has passed beyond `moment`: the groups whose time is over, first ones first."""
         found: list[Emission] = []
         while (deadline := self.deadline()) is not None and deadline <= moment:
-            group = next(iter(self._groups.values()))
+            group = next(iter(self._telling.values()))
             self._remove(group)
             found += self._over(group)
+        self._forget(moment + 1)
         return found
+
+    def _forget(self, moment: int) -> None:
+        """Let go of groups whose time was over before a moment, and of which nothing is told."""
+        while self._groups:
+            group = next(iter(self._groups.values()))
+            if group.deadline >= moment or (group.key, group.tag) in self._telling:
+                return
+            self._remove(group)
 
     def snapshot(self) -> Any:
         """The state as plain JSON."""
@@ -225,6 +215,10 @@ class GroupedProcess(Generic[Definition]):
         """What an event does to the groups of a key."""
         raise NotImplementedError
 
+    def _tells(self, group: Group) -> bool:
+        """Whether anything follows when the time of a group is over; else nobody need wait for that."""
+        raise NotImplementedError
+
     def _over(self, group: Group) -> Sequence[Emission]:
         """What follows when the time of a group, which is no longer held, is over."""
         raise NotImplementedError
@@ -234,19 +228,20 @@ class GroupedProcess(Generic[Definition]):
 
     def _put(self, group: Group) -> None:
         """Hold a group, behind all others; beyond the bound the one whose time is over first is dropped."""
-        self._groups.pop((group.key, group.tag), None)
-        self._groups[group.key, group.tag] = group
+        name = (group.key, group.tag)
+        self._groups.pop(name, None)
+        self._telling.pop(name, None)
+        self._groups[name] = group
+        if self._tells(group):
+            self._telling[name] = group
         if len(self._groups) > self._definition.most_groups:
             self._remove(next(iter(self._groups.values())))
             self._dropped += 1
 
     def _remove(self, group: Group) -> None:
-        del self._groups[group.key, group.tag]
-
-
-def span_of(held: Sequence[Fed]) -> int:
-    """From the least begin to the greatest end of events, in microseconds: the duration of what they make up."""
-    return max(fed.event.interval.micros[1] for fed in held) - min(fed.begin for fed in held)
+        name = (group.key, group.tag)
+        del self._groups[name]
+        self._telling.pop(name, None)
 
 
 def alike(held: Sequence[Fed]) -> tuple[tuple[str, StoredEvent], ...]:

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from heapq import heappop, heappush
 from typing import Any, Self
 from uuid import UUID
 
 from elm.cues.algebra import Cue
-from elm.event import StoredEvent
 from elm.features import Feature, FeatureValue
 from elm.interval import from_micros
 from elm.recognizers.base import Emission, Fed, Judge
 from elm.recognizers.measures import Measure
 from elm.recognizers.partition import Key, keys_of, values_of
 from elm.recognizers.plan import Plan, Target
+from elm.recognizers.runs import NOTHING, Queue, Run, Taken, run_of, taken_by, told
 
 MATCH, TIMED_OUT = "match", "timed out"
 
@@ -35,63 +34,6 @@ class Rules:
     most_runs: int
 
 
-_Taken = tuple["_Taken | None", int, Fed, int]
-"""What a run took, last first: what it took before, the step, the event, and the event's place in the partition."""
-
-
-class _Run:
-    """One way to take events: where it stands, what it took, and what has been closed to it since."""
-
-    __slots__ = (
-        "alive",
-        "begin",
-        "closed",
-        "count",
-        "deadline",
-        "ends_silently",
-        "key",
-        "last",
-        "passed",
-        "serial",
-        "start",
-        "taken",
-    )
-
-    def __init__(self, serial: int, key: Key, start: int, taken: _Taken, count: int, begin: int, last: int) -> None:
-        self.serial = serial
-        self.key = key
-        self.start = start
-        self.taken = taken
-        self.count = count
-        self.begin = begin
-        self.last = last
-        self.closed: frozenset[int] = _NOTHING
-        """Negations, and the absence, that an event met since the last one taken."""
-        self.passed = False
-        """Whether an event was passed over since the last one taken."""
-        self.deadline: int | None = None
-        self.ends_silently = False
-        self.alive = True
-
-    def rank(self) -> tuple[list[int], list[int], Key]:
-        """What comes first of two that become certain at once: the places of its events, then its steps."""
-        trail = self.trail()
-        return [each[3] for each in trail], [each[1] for each in trail], self.key
-
-    def trail(self) -> list[_Taken]:
-        """What was taken, first first."""
-        found: list[_Taken] = []
-        each: _Taken | None = self.taken
-        while each is not None:
-            found.append(each)
-            each = each[0]
-        found.reverse()
-        return found
-
-
-_NOTHING: frozenset[int] = frozenset()
-
-
 class Matching:
     """A pattern at work: its unfinished runs by partition, and their deadlines. A `Process`."""
 
@@ -99,10 +41,12 @@ class Matching:
         self._rules = rules
         self._plan = plan
         self._around = around
-        self._runs: dict[Key, list[_Run]] = {}
-        self._timers: list[tuple[int, int, _Run]] = []
-        self._silent: list[tuple[int, int, _Run]] = []
+        self._runs: dict[Key, list[Run]] = {}
+        self._timers = Queue(lambda pushed, run: run.alive and run.timer == pushed)
+        self._silent = Queue(lambda pushed, run: run.alive and run.timer == pushed)
         """Deadlines of runs that nothing comes of: nobody need wait for them."""
+        self._oldest: Queue | None = None
+        """Runs as they began, kept from the first time on that there were too many."""
         self._place = 0
         self._serial = 0
         self._pushed = 0
@@ -117,8 +61,7 @@ class Matching:
     def feed(self, fed: Fed) -> Sequence[Emission]:
         """Take in an event; those that matched because of it."""
         event = fed.event
-        if self._silent and self._silent[0][0] < fed.moment:
-            self._end_silent(fed.moment)
+        self._end_silent(fed.moment)
         try:
             statics = self._by_type[event.type]
         except KeyError:
@@ -145,7 +88,7 @@ class Matching:
         return statics
 
     def _feed_one(self, key: Key, fed: Fed, hits: _Hits) -> list[Emission]:
-        certain: list[_Run] = []
+        certain: list[Run] = []
         self._has_ended = False
         runs = self._runs.get(key)
         if runs is not None:
@@ -153,15 +96,15 @@ class Matching:
                 self._offer(run, fed, hits, certain)
         if hits.of(0) and fed.moment - fed.begin <= self._rules.within and hits.holds(0, None):
             self._serial += 1
-            taken: _Taken = (None, 0, fed, self._place)
-            self._begin(_Run(self._serial, key, self._place, taken, 1, fed.begin, fed.moment), certain)
+            taken: Taken = (None, 0, fed, self._place)
+            self._begin(Run(self._serial, key, self._place, taken, 1, fed.begin, fed.moment), certain)
         if not certain and not self._has_ended:
             return []
         found = self._decided(certain, fed.moment)
         self._clear(key)
         return found
 
-    def _offer(self, run: _Run, fed: Fed, hits: _Hits, certain: list[_Run]) -> None:
+    def _offer(self, run: Run, fed: Fed, hits: _Hits, certain: list[Run]) -> None:
         """Have a run take the event, divide, or pass over it."""
         targets = self._plan.targets(run.taken[1], run.count)
         first = None
@@ -179,17 +122,16 @@ class Matching:
             for target in targets:
                 if self._is_possible(run, target, fed, hits):
                     self._serial += 1
-                    other = _Run(self._serial, run.key, run.start, run.taken, run.count, run.begin, run.last)
-                    self._runs[run.key].append(other)
-                    self._held += 1
+                    other = Run(self._serial, run.key, run.start, run.taken, run.count, run.begin, run.last)
+                    self._hold(other)
                     self._take(other, target, fed, certain)
             if self._plan.watches[run.taken[1]]:
                 self._pass_over(run, targets, hits, certain)
 
-    def _targets(self, run: _Run) -> tuple[Target, ...]:
+    def _targets(self, run: Run) -> tuple[Target, ...]:
         return self._plan.targets(run.taken[1], run.count)
 
-    def _is_possible(self, run: _Run, target: Target, fed: Fed, hits: _Hits) -> bool:
+    def _is_possible(self, run: Run, target: Target, fed: Fed, hits: _Hits) -> bool:
         if not hits.of(target.step) or (target.strict and run.passed):
             return False
         if fed.moment - min(run.begin, fed.begin) > self._rules.within:
@@ -200,21 +142,27 @@ class Matching:
             return False
         return hits.holds(target.step, run.taken)
 
-    def _begin(self, run: _Run, certain: list[_Run]) -> None:
-        self._runs.setdefault(run.key, []).append(run)
-        self._held += 1
+    def _begin(self, run: Run, certain: list[Run]) -> None:
+        self._hold(run)
         self._go_on(run, certain)
 
-    def _take(self, run: _Run, target: Target, fed: Fed, certain: list[_Run]) -> None:
+    def _hold(self, run: Run) -> None:
+        self._runs.setdefault(run.key, []).append(run)
+        self._held += 1
+        if self._oldest is not None:
+            self._oldest.push(run.start, run.serial, run)
+            self._oldest.tidy(self._held)
+
+    def _take(self, run: Run, target: Target, fed: Fed, certain: list[Run]) -> None:
         run.count = run.count + 1 if target.step == run.taken[1] else 1
         run.taken = (run.taken, target.step, fed, self._place)
         run.begin = min(run.begin, fed.begin)
         run.last = fed.moment
-        run.closed = _NOTHING
+        run.closed = NOTHING
         run.passed = False
         self._go_on(run, certain)
 
-    def _go_on(self, run: _Run, certain: list[_Run]) -> None:
+    def _go_on(self, run: Run, certain: list[Run]) -> None:
         """What follows from an event just taken: a match, and until when the run waits."""
         targets = self._targets(run)
         if self._is_accepting(run) and self._plan.absent is None and (not targets or targets[0].divides):
@@ -225,7 +173,7 @@ class Matching:
                 return
         self._set_deadline(run, targets)
 
-    def _pass_over(self, run: _Run, targets: tuple[Target, ...], hits: _Hits, certain: list[_Run]) -> None:
+    def _pass_over(self, run: Run, targets: tuple[Target, ...], hits: _Hits, certain: list[Run]) -> None:
         run.passed = True
         plan, step = self._plan, run.taken[1]
         met = [g for g in plan.guards_behind[step] if g not in run.closed and hits.of(g) and hits.holds(g, run.taken)]
@@ -248,15 +196,15 @@ class Matching:
 
     # What follows
 
-    def _is_accepting(self, run: _Run) -> bool:
+    def _is_accepting(self, run: Run) -> bool:
         step = run.taken[1]
         return run.count >= self._plan.least[step] and self._plan.may_end[step]
 
-    def _is_match_at_its_end(self, run: _Run, targets: tuple[Target, ...]) -> bool:
+    def _is_match_at_its_end(self, run: Run, targets: tuple[Target, ...]) -> bool:
         """Whether an accepting run waited to take more; if its first target divides it was a match at once."""
         return self._is_accepting(run) and not targets[0].divides
 
-    def _set_deadline(self, run: _Run, targets: tuple[Target, ...]) -> None:
+    def _set_deadline(self, run: Run, targets: tuple[Target, ...]) -> None:
         absent = self._plan.absent
         if absent is not None and absent not in run.closed and self._is_accepting(run):
             deadline = run.last + self._plan.absent_for
@@ -269,9 +217,12 @@ class Matching:
         if deadline != run.deadline or ends_silently is not run.ends_silently:
             run.deadline, run.ends_silently = deadline, ends_silently
             self._pushed += 1
-            heappush(self._silent if ends_silently else self._timers, (deadline, self._pushed, run))
+            run.timer = self._pushed
+            queue = self._silent if ends_silently else self._timers
+            queue.push(deadline, self._pushed, run)
+            queue.tidy(self._held)
 
-    def _tells_at_its_end(self, run: _Run, targets: tuple[Target, ...]) -> bool:
+    def _tells_at_its_end(self, run: Run, targets: tuple[Target, ...]) -> bool:
         """Whether something is emitted when time has passed beyond a run's deadline."""
         if not self._is_accepting(run):
             return self._rules.timed_out is not None
@@ -279,12 +230,12 @@ class Matching:
             return self._plan.absent not in run.closed
         return not targets[0].divides
 
-    def _copy(self, run: _Run) -> _Run:
-        copy = _Run(run.serial, run.key, run.start, run.taken, run.count, run.begin, run.last)
+    def _copy(self, run: Run) -> Run:
+        copy = Run(run.serial, run.key, run.start, run.taken, run.count, run.begin, run.last)
         copy.alive = run.alive
         return copy
 
-    def _end(self, run: _Run) -> None:
+    def _end(self, run: Run) -> None:
         if run.alive:
             run.alive = False
             self._held -= 1
@@ -300,22 +251,28 @@ class Matching:
 
     def _drop(self) -> None:
         """Keep to the bound: drop the runs that began first."""
-        runs = sorted((run for each in self._runs.values() for run in each), key=lambda run: (run.start, run.serial))
-        dropped = runs[: self._held - self._rules.most_runs]
-        for run in dropped:
+        if self._oldest is None:
+            self._oldest = Queue(lambda serial, run: run.alive)
+            for runs in self._runs.values():
+                for run in runs:
+                    self._oldest.push(run.start, run.serial, run)
+        keys: set[Key] = set()
+        while self._held > self._rules.most_runs and self._oldest.first() is not None:
+            run = self._oldest.pop()
             self._end(run)
             self._dropped += 1
-        for key in {run.key for run in dropped}:
+            keys.add(run.key)
+        for key in keys:
             self._clear(key)
 
     # Which matches count
 
-    def _decided(self, certain: list[_Run], moment: int) -> list[Emission]:
+    def _decided(self, certain: list[Run], moment: int) -> list[Emission]:
         """The results among matches that are certain at one moment, of one partition or of several."""
         found: list[Emission] = []
         barred_to: dict[Key, int] = {}
         barred: set[tuple[Key, int]] = set()
-        for run in sorted(certain, key=_Run.rank):
+        for run in sorted(certain, key=Run.rank):
             if run.start <= barred_to.get(run.key, 0) or (run.key, run.start) in barred:
                 continue
             found.append(self._emission(run, MATCH, moment))
@@ -327,12 +284,12 @@ class Matching:
                 self._bar(run.key, lambda other, start=run.start: other.start == start)  # type: ignore[misc]
         return found
 
-    def _bar(self, key: Key, is_barred: Callable[[_Run], bool]) -> None:
+    def _bar(self, key: Key, is_barred: Callable[[Run], bool]) -> None:
         for other in self._runs.get(key, ()):
             if other.alive and is_barred(other):
                 self._end(other)
 
-    def _emission(self, run: _Run, output: str, moment: int) -> Emission:
+    def _emission(self, run: Run, output: str, moment: int) -> Emission:
         trail = run.trail()
         waited = output == TIMED_OUT or self._plan.absent is not None
         return Emission(
@@ -344,7 +301,7 @@ class Matching:
             deadline=from_micros(moment) if waited else None,
         )
 
-    def _measured(self, trail: Sequence[_Taken]) -> tuple[Feature, ...]:
+    def _measured(self, trail: Sequence[Taken]) -> tuple[Feature, ...]:
         found: list[tuple[str, FeatureValue]] = []
         for name, measure in self._rules.measures.items():
             of_step = [fed.event for _, at, fed, _ in trail if measure.step in (None, self._plan.names[at])]
@@ -357,23 +314,15 @@ class Matching:
 
     def deadline(self) -> int | None:
         """The moment after which `expire` has something to tell."""
-        timers = self._timers
-        while timers:
-            deadline, _, run = timers[0]
-            if run.alive and run.deadline == deadline and not run.ends_silently:
-                return deadline
-            heappop(timers)
-        return None
+        return self._timers.first()
 
     def _end_silent(self, moment: int) -> None:
         """Let go of runs whose time was over before a moment, and that nothing comes of."""
-        silent = self._silent
         keys: set[Key] = set()
-        while silent and silent[0][0] < moment:
-            deadline, _, run = heappop(silent)
-            if run.alive and run.deadline == deadline and run.ends_silently:
-                self._end(run)
-                keys.add(run.key)
+        while (deadline := self._silent.first()) is not None and deadline < moment:
+            run = self._silent.pop()
+            self._end(run)
+            keys.add(run.key)
         for key in keys:
             self._clear(key)
 
@@ -381,15 +330,15 @@ class Matching:
         """Time has passed beyond `moment`: what matched or timed out because of it, by deadline."""
         found: list[Emission] = []
         while (deadline := self.deadline()) is not None and deadline <= moment:
-            due: list[_Run] = []
+            due: list[Run] = []
             while self.deadline() == deadline:
-                due.append(heappop(self._timers)[2])
-                due[-1].deadline = None
+                due.append(self._timers.pop())
+                due[-1].deadline, due[-1].timer = None, 0
             found += self._expired(due, deadline)
         self._end_silent(moment + 1)
         return found
 
-    def _expired(self, due: list[_Run], deadline: int) -> list[Emission]:
+    def _expired(self, due: list[Run], deadline: int) -> list[Emission]:
         certain, late = [], []
         for run in due:
             if self._is_accepting(run):
@@ -398,7 +347,7 @@ class Matching:
             else:
                 late.append(run)
         found = self._decided(certain, deadline) if certain else []
-        for run in sorted(late, key=_Run.rank):
+        for run in sorted(late, key=Run.rank):
             if run.alive:
                 found.append(self._emission(run, TIMED_OUT, deadline))
                 self._end(run)
@@ -427,18 +376,7 @@ class Matching:
             "place": self._place,
             "serial": self._serial,
             "dropped": self._dropped,
-            "runs": [
-                {
-                    "serial": run.serial,
-                    "key": [list(pair) for pair in run.key],
-                    "start": run.start,
-                    "taken": [[step, str(fed.event.uid), place] for _, step, fed, place in run.trail()],
-                    "closed": sorted(run.closed),
-                    "passed": run.passed,
-                }
-                for runs in self._runs.values()
-                for run in runs
-            ],
+            "runs": [told(run) for runs in self._runs.values() for run in runs],
         }
 
     @classmethod
@@ -448,27 +386,10 @@ class Matching:
         process._place, process._serial = snapshot["place"], snapshot["serial"]
         process._dropped = snapshot["dropped"]
         for each in snapshot["runs"]:
-            run = _run_of(each, held)
-            process._runs.setdefault(run.key, []).append(run)
-            process._held += 1
+            run = run_of(each, held)
+            process._hold(run)
             process._set_deadline(run, process._targets(run))
         return process
-
-
-def _run_of(told: Any, held: Mapping[str, Fed]) -> _Run:
-    taken: _Taken | None = None
-    count = 0
-    for step, uid, place in told["taken"]:
-        count = count + 1 if taken is not None and taken[1] == step else 1
-        taken = (taken, step, held[uid], place)
-    assert taken is not None  # noqa: S101 - a run begins by taking an event
-    feds = [held[uid] for _, uid, _ in told["taken"]]
-    key = tuple((kind, value) for kind, value in told["key"])
-    begin = min(fed.begin for fed in feds)
-    run = _Run(told["serial"], key, told["start"], taken, count, begin, feds[-1].moment)
-    run.closed = frozenset(told["closed"])
-    run.passed = told["passed"]
-    return run
 
 
 class _Hits:
@@ -492,21 +413,10 @@ class _Hits:
             self._known[atom] = known
         return known
 
-    def holds(self, atom: int, taken: _Taken | None) -> bool:
+    def holds(self, atom: int, taken: Taken | None) -> bool:
         """Whether the atom's conditions hold for the event and what a run took."""
         # Written out: most atoms have none, and all() of a generator takes its time for nothing.
         for condition, step in self._plan.atoms[atom].conditions:
-            if not condition.holds(self._event, _taken_by(step, taken)):
+            if not condition.holds(self._event, taken_by(step, taken)):
                 return False
         return True
-
-
-def _taken_by(step: int, taken: _Taken | None) -> list[StoredEvent]:
-    """The events that one step took, in order."""
-    found = []
-    while taken is not None:
-        if taken[1] == step:
-            found.append(taken[2].event)
-        taken = taken[0]
-    found.reverse()
-    return found

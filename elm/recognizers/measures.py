@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import assert_never
@@ -12,6 +12,7 @@ from elm.cues.algebra import named
 from elm.errors import InvalidValue
 from elm.event import StoredEvent
 from elm.features import FeatureValue, kind_of
+from elm.recognizers.base import check_feature
 from elm.text import check_name
 
 
@@ -76,6 +77,20 @@ class Measure:
                 return max(numbers, default=None)
             case _:
                 assert_never(self.aggregate)
+
+
+def checked_measures(given: Mapping[str, Measure], steps: Iterable[str], *, what: str) -> dict[str, Measure]:
+    """Measures by the names of their features, when each can be taken of a recognizer with these steps."""
+    if not isinstance(given, Mapping):
+        raise InvalidValue(f'the measures of {what} have names, as in {{"drops": count()}}, not {given!r:.80}')
+    known = tuple(steps)
+    for name, measure in given.items():
+        check_feature(name, what=f"the name of a measure of {what}")
+        if not isinstance(measure, Measure):
+            raise InvalidValue(f"{what} measures by count(), mean(...) and the like, not by {measure!r:.80}")
+        if measure.step is not None and measure.step not in known:
+            raise InvalidValue(f"{what} measures step {measure.step!r}; its steps are {', '.join(map(repr, known))}")
+    return dict(given)
 
 
 def count(step: str | None = None) -> Measure:

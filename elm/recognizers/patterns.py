@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Set
 from dataclasses import dataclass, field
 from datetime import timedelta
 from enum import StrEnum
@@ -10,17 +10,18 @@ from typing import TYPE_CHECKING, Any
 
 from elm.cues.algebra import And, Cue, Or, named
 from elm.errors import InvalidValue
-from elm.recognizers.base import DEADLINE, Fed, Judge, Process, check_identity
-from elm.recognizers.elements import Absent, Contiguity, Element, Step, check_duration, check_elements
+from elm.recognizers.base import DEADLINE, Fed, Judge, Process, check_count, check_identity
+from elm.recognizers.durations import check_duration, micros_of
+from elm.recognizers.elements import Absent, Contiguity, Element, Step, check_elements
 from elm.recognizers.matching import Matching, Rules
-from elm.recognizers.measures import Measure
+from elm.recognizers.measures import Measure, checked_measures
+from elm.recognizers.naming import ordered_names, parents_of
 from elm.recognizers.plan import plan
 from elm.recognizers.purity import check_pure
 from elm.recognizers.spelling import plain
 from elm.taxonomy import EventType
-from elm.text import check_name, check_short_name
+from elm.text import check_short_name
 
-_MICROSECOND = timedelta(microseconds=1)
 MOST_RUNS = 10_000
 """Unfinished runs that one process of a pattern holds, unless the pattern says otherwise."""
 
@@ -82,23 +83,18 @@ class Pattern:
         if self.timed_out is not None:
             check_short_name(self.timed_out, what=f"the type of what times out in {what}")
         check_duration(self.within, what=f"the time within which {what} must be complete")
-        if isinstance(self.partition, str):
-            raise InvalidValue(f"the partition of {what} is several feature names: [{self.partition!r}]")
-        for given in ("elements", "partition", "parents"):
-            object.__setattr__(self, given, tuple(getattr(self, given)))
-        for name in self.partition:
-            check_name(name, what=f"a feature of the partition of {what}")
+        if isinstance(self.elements, str | Set) or not isinstance(self.elements, Iterable):
+            raise InvalidValue(f"the elements of {what} are a list: [step(...), ...], not {self.elements!r:.80}")
+        object.__setattr__(self, "elements", tuple(self.elements))
+        object.__setattr__(self, "partition", ordered_names(self.partition, what=f"the partition of {what}"))
+        object.__setattr__(self, "parents", parents_of(self.type, self.parents))
         if self.among is not None:
             check_pure(self.among, what=f"the filter of {what}")
         object.__setattr__(self, "after_match", named(self.after_match, AfterMatch, what="what comes after a match"))
-        object.__setattr__(self, "measures", dict(self.measures))
-        if isinstance(self.most_runs, bool) or not isinstance(self.most_runs, int) or self.most_runs < 1:
-            raise InvalidValue(f"{what} holds a number of runs from 1 on, not {self.most_runs!r}")
+        check_count(self.most_runs, what=f"'most_runs' of {what}")
         check_elements(self.elements, what=what)
-        names = {each.name for each in self.steps}
-        for measure in self.measures.values():
-            if measure.step is not None and measure.step not in names:
-                raise InvalidValue(f"{what} measures step {measure.step!r}, which it does not have")
+        measures = checked_measures(self.measures, (each.name for each in self.steps), what=what)
+        object.__setattr__(self, "measures", measures)
         if self.timed_out and any(each.contiguity is Contiguity.SKIP_TILL_ANY for each in self.steps):
             raise InvalidValue(
                 f"{what} lists every combination (skip-till-any): which of them timed out cannot be said. "
@@ -147,7 +143,7 @@ class Pattern:
         return Rules(
             type=self.type,
             timed_out=self.timed_out,
-            within=self.within // _MICROSECOND,
+            within=micros_of(self.within),
             among=self.among,
             partition=self.partition,
             bars_overlaps=self.after_match is AfterMatch.PAST_LAST,

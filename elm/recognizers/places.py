@@ -12,16 +12,8 @@ from elm.errors import InvalidValue
 from elm.event import StoredEvent
 from elm.geometry import LIMIT, Region, SpatialRelation
 from elm.recognizers.base import Emission, Fed, Judge, Process
-from elm.recognizers.grouped import (
-    MOST_PARTS,
-    Group,
-    Grouped,
-    GroupedProcess,
-    alike,
-    later,
-    micros_of,
-    span_of,
-)
+from elm.recognizers.durations import later, micros_of
+from elm.recognizers.grouped import MOST_PARTS, Group, Grouped, GroupedProcess, alike
 from elm.recognizers.partition import Key, values_of
 from elm.taxonomy import EventType
 from elm.text import check_short_name
@@ -107,6 +99,7 @@ class _Stays(GroupedProcess[Stay]):
         self._places = [(name, region.frame, definition.inside(region)) for name, region in places]
         self._of = Place(definition.of)
         self._gap = micros_of(definition.gap)
+        self._least = micros_of(definition.least)
 
     def _take(self, key: Key, fed: Fed) -> Sequence[Emission]:
         where = _where(fed.event, self._of)
@@ -132,8 +125,7 @@ class _Stays(GroupedProcess[Stay]):
             group = None
         if group is None:
             group = Group(key, (_INSIDE, place), deadline, [])
-        group.held.append(fed)
-        group.deadline = deadline
+        group.add(fed, deadline)
         self._put(group)
         return found
 
@@ -148,11 +140,14 @@ class _Stays(GroupedProcess[Stay]):
             self._put(Group(key, (_OUTSIDE, place), later(fed.moment, self._gap), [fed]))
         return found
 
+    def _tells(self, group: Group) -> bool:
+        return group.tag[0] == _INSIDE and (group.span >= self._least or self._definition.passage is not None)
+
     def _over(self, group: Group) -> Sequence[Emission]:
         side, place = group.tag
         if side == _OUTSIDE:
             return ()
-        is_stay = span_of(group.held) >= micros_of(self._definition.least)
+        is_stay = group.span >= self._least
         kind = self._definition.type if is_stay else self._definition.passage
         if kind is None:
             return ()
@@ -231,19 +226,21 @@ class _Standstills(GroupedProcess[Standstill]):
         if where is None:
             return ()
         found: Sequence[Emission] = ()
-        held: list[Fed] = []
+        deadline = later(fed.moment, micros_of(self._definition.gap))
         group = self._find(key, where.frame)
         if group is not None:
             if not self._reaches(group.held[0], fed):
                 found = self._over(group)
                 held = [] if found else self._from_later(group.held, fed)
+                group = Group(key, group.tag, deadline, held)
             elif len(group.held) >= self._definition.most_parts:
                 self._split += 1
                 found = self._over(group)
-            else:
-                held = group.held
-        held.append(fed)
-        self._put(Group(key, (where.frame,), later(fed.moment, micros_of(self._definition.gap)), held))
+                group = None
+        if group is None:
+            group = Group(key, (where.frame,), deadline, [])
+        group.add(fed, deadline)
+        self._put(group)
         return found
 
     def _from_later(self, held: list[Fed], fed: Fed) -> list[Fed]:
@@ -261,8 +258,11 @@ class _Standstills(GroupedProcess[Standstill]):
             return False
         return bool(there.polygon.distance(here.polygon.centroid) <= self._definition.radius)
 
+    def _tells(self, group: Group) -> bool:
+        return group.span >= micros_of(self._definition.least)
+
     def _over(self, group: Group) -> Sequence[Emission]:
-        if span_of(group.held) < micros_of(self._definition.least):
+        if not self._tells(group):
             return ()
         parts = alike(group.held)
         features = self._definition.measured(parts)

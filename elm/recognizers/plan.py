@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from datetime import timedelta
 from typing import TYPE_CHECKING
 
 from elm.cues.algebra import Cue
 from elm.recognizers.conditions import Condition
+from elm.recognizers.durations import micros_of
 from elm.recognizers.elements import Absent, Contiguity, Step, Without
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from elm.recognizers.elements import Element
-
-_MICROSECOND = timedelta(microseconds=1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -110,7 +108,7 @@ def plan(elements: Sequence[Element]) -> Plan:
             for guards, ends in zip(guards_behind, may_end, strict=True)
         ),
         absent=None if absence is None else len(every) - 1,
-        absent_for=0 if absence is None else absence.duration // _MICROSECOND,
+        absent_for=0 if absence is None else micros_of(absence.duration),
         has_strict=has_strict,
     )
 
@@ -121,5 +119,5 @@ def _target(step: Step, number: int, guards: list[int]) -> Target:
         guards=tuple(guards),
         strict=step.contiguity is Contiguity.STRICT,
         divides=step.contiguity is Contiguity.SKIP_TILL_ANY,
-        gap=None if step.longest_gap is None else step.longest_gap // _MICROSECOND,
+        gap=None if step.longest_gap is None else micros_of(step.longest_gap),
     )

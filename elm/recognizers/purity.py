@@ -8,6 +8,8 @@ from elm.errors import InvalidValue
 
 def check_pure(cue: Cue, *, what: str) -> Cue:
     """`cue`, unless it asks what a later commit may change or what only the memory knows."""
+    if not isinstance(cue, Cue):
+        raise InvalidValue(f"{what} needs a cue (elm.cues), not {cue!r:.80}")
     match node(cue):
         case And(args=args) | Or(args=args):
             for arg in args:

@@ -11,9 +11,9 @@ from typing import Any
 from elm.cues.algebra import Cue
 from elm.cues.codec import cue_to_json
 from elm.exchange import region_to_json
+from elm.features import canonical
 from elm.geometry import Region
-
-_MICROSECOND = timedelta(microseconds=1)
+from elm.recognizers.durations import micros_of
 
 
 def plain(value: Any) -> Any:
@@ -23,9 +23,9 @@ def plain(value: Any) -> Any:
     if value is None or isinstance(value, str | int | float | bool):
         return value
     if isinstance(value, timedelta):
-        return {"microseconds": value // _MICROSECOND}
+        return {"microseconds": micros_of(value)}
     if isinstance(value, Cue):
-        return cue_to_json(value)
+        return _sorted_sets(cue_to_json(value))
     if isinstance(value, Region):
         return region_to_json(value)
     if isinstance(value, Mapping):
@@ -36,3 +36,18 @@ def plain(value: Any) -> Any:
         named = {each.name: plain(getattr(value, each.name)) for each in fields(value) if each.name != "function"}
         return {"is": type(value).__name__, **named}
     raise TypeError(f"a definition cannot hold {value!r:.80}")
+
+
+def _sorted_sets(cue: dict[str, Any]) -> dict[str, Any]:
+    """A cue's JSON with what is a set in meaning in an order of its own, not that in which it was given."""
+    spelled = dict(cue)
+    if cue["op"] in ("and", "or"):
+        spelled["args"] = [_sorted_sets(arg) for arg in cue["args"]]
+    elif cue["op"] == "not":
+        spelled["arg"] = _sorted_sets(cue["arg"])
+    elif cue["op"] == "features":
+        spelled["features"] = sorted(cue["features"], key=lambda pair: canonical((pair[0], pair[1])))
+    for name in ("names", "uids"):
+        if name in cue:
+            spelled[name] = sorted(cue[name])
+    return spelled

@@ -11,7 +11,9 @@ from typing import Any, ClassVar, Literal
 from elm.cues.algebra import Cue, Or, Place, named
 from elm.recognizers.base import Emission, Fed, Judge, Process
 from elm.recognizers.conditions import Condition, Near, Same
-from elm.recognizers.grouped import Group, Grouped, GroupedProcess, keep_names, later, micros_of
+from elm.recognizers.durations import later, micros_of
+from elm.recognizers.grouped import Group, Grouped, GroupedProcess
+from elm.recognizers.naming import sorted_names
 from elm.recognizers.partition import Key, values_of
 from elm.taxonomy import EventType
 
@@ -43,7 +45,8 @@ class CoOccurrence(Grouped):
         Grouped.__post_init__(self)
         self._check_cues(self.first, self.second)
         self._check_durations("within", "at_least")
-        keep_names(self, "same", what=f"what both events of {self.title} have in common")
+        same = sorted_names(self.same, what=f"what both events of {self.title} have in common")
+        object.__setattr__(self, "same", same)
         self._check_count("most_held")
         object.__setattr__(self, "of", named(self.of, Place, what=f"whose place {self.title} looks at"))
         self.conditions()
@@ -125,6 +128,9 @@ class _CoOccurrences(GroupedProcess[CoOccurrence]):
             self._dropped += 1
         held.append(fed)
         self._put(Group(key, (side,), later(fed.moment, self._within), held))
+
+    def _tells(self, group: Group) -> bool:
+        return False
 
     def _over(self, group: Group) -> Sequence[Emission]:
         return ()

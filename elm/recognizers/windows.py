@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import timedelta
 from typing import Any, Self
@@ -11,9 +11,10 @@ from typing import Any, Self
 from elm.cues.algebra import Comparison, Cue, FeatureCue, named
 from elm.cues.match import COMPARE
 from elm.errors import InvalidValue
-from elm.features import Feature, FeatureValue, kind_of
+from elm.features import Feature, FeatureValue, canonical, kind_of
 from elm.recognizers.base import Emission, Fed, Judge, Process
-from elm.recognizers.grouped import MOST_PARTS, Grouped, alike, later, micros_of
+from elm.recognizers.durations import later, micros_of
+from elm.recognizers.grouped import MOST_PARTS, Grouped, alike
 from elm.recognizers.partition import Key, keys_of, values_of
 from elm.taxonomy import EventType
 
@@ -45,13 +46,17 @@ class Windowed(Grouped):
             if not getattr(self, name):
                 raise InvalidValue(f"{name!r} of {self.title} is longer than nothing")
         self._check_count("most_parts")
-        object.__setattr__(self, "having", tuple(self._checked(each) for each in self.having))
+        if isinstance(self.having, str) or not isinstance(self.having, Iterable):
+            raise InvalidValue(f'{self.title} has [("count", ">=", 3)] and the like, not {self.having!r:.80}')
+        # In an order of its own, for all must hold: that in which they were given says nothing.
+        having = sorted((self._checked(each) for each in self.having), key=_spelled)
+        object.__setattr__(self, "having", tuple(having))
 
     def _checked(self, given: Having) -> Having:
         if not isinstance(given, tuple | list) or len(given) != 3:
             raise InvalidValue(f'{self.title} has ("count", ">=", 3) and the like, not {given!r:.80}')
         name, comparison, value = given
-        if name not in self.measures:
+        if not isinstance(name, str) or name not in self.measures:
             raise InvalidValue(f"{self.title} compares {name!r:.80}, which it does not measure: add it to measures")
         how = named(comparison, Comparison, what=f"a comparison of {self.title}")
         cue = FeatureCue(name=name, compare=how, value=value)
@@ -189,6 +194,11 @@ class _Windows:
     def counts(self) -> Mapping[str, int]:
         """Groups with an open window that may be a result, and windows that were dropped."""
         return {"partial": sum(1 for group in self._groups.values() if group.held), "dropped": self._dropped}
+
+
+def _spelled(having: Having) -> tuple[str, str, str]:
+    name, how, value = having
+    return name, how, canonical((name, value))
 
 
 def _by_end(fed: Fed) -> tuple[int, int, bytes]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from itertools import product
 from typing import Any
 from uuid import UUID
@@ -24,6 +25,8 @@ from tests.clock import at, span
 
 SECOND = 10**6
 """In microseconds."""
+LATEST = to_micros(datetime.max.replace(tzinfo=UTC))
+"""The last moment that there is."""
 MANY = settings(max_examples=200)
 """A process costs little, so each is tried on many streams."""
 TYPES = ("A", "B", "C")
@@ -125,6 +128,8 @@ def feed_all(recognizer: Recognizer, events: Sequence[Fed], between: Callable[[P
         following = process.deadline()
         assert following is None or following >= each.moment
     expire(None)
+    # What nothing is told of need not be waited for, but is forgotten when time passes.
+    assert list(process.expire(LATEST)) == []
     assert list(process.held()) == []
     assert process.counts()["partial"] == 0
     assert process.snapshot()["groups"] == []

@@ -22,7 +22,7 @@ from elm.recognizers.measures import count
 from elm.recognizers.places import Standstill, Stay
 from elm.recognizers.together import CoOccurrence
 from elm.recognizers.windows import Windowed
-from tests.recognition.ready_made import Surroundings, fed, feed_all, in_order, moments_in
+from tests.recognition.ready_made import LATEST, Surroundings, fed, feed_all, in_order, moments_in
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "recognition.md").read_text(encoding="utf-8")
 EXAMPLES = re.findall(r"^```python\n(.*?)^```$", PAGE.partition("\n## Ready-made")[2], flags=re.MULTILINE | re.DOTALL)
@@ -147,11 +147,10 @@ def test_a_time_beyond_all_datetimes_is_never_over(kind: type[Grouped], fields: 
     process = is_recognizer(made(kind, longest)).start(Surroundings())
     process.feed(fed(1, 0, region=HERE))
 
-    deadline = process.deadline()
-
-    assert deadline is not None
+    assert process.deadline() in (None, LATEST)
     assert msgspec.json.encode(process.snapshot())
-    assert process.expire(deadline - 1) == []
+    assert process.expire(LATEST - 1) == []
+    assert bool(process.held()) is (fields.get("per") != "day"), "a day is over long before"
 
 
 def test_a_mission_that_never_times_out_still_says_when_it_would() -> None:
@@ -199,4 +198,8 @@ def test_a_day_is_remembered_for_as_many_groups_as_the_bound_allows() -> None:
 
     assert [len(each) for each in results] == [1, 1, 1, 1]
     assert process.counts() == {"partial": 0, "dropped": 2, "split": 0}
-    assert process.deadline() == moments_in(14 * 3600) - 1
+    assert process.deadline() is None, "nothing is told when a day is over"
+    process.expire(moments_in(14 * 3600) - 2)
+    assert len(process.snapshot()["groups"]) == 2
+    process.expire(moments_in(14 * 3600) - 1)
+    assert process.snapshot()["groups"] == []
