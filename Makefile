@@ -17,7 +17,7 @@ test: setup  ## all tests but the slow ones; in containers too where a Docker en
 	@$$ELM_DOCKER_WRAPPER .venv/bin/python -m pytest -m "not slow" --numprocesses auto --maxprocesses 4 --dist loadfile
 
 test-slow: setup  ## long fuzzing and memories of 10^6 events
-	@$$ELM_DOCKER_WRAPPER .venv/bin/python -m pytest -m slow
+	@$$ELM_DOCKER_WRAPPER .venv/bin/python -m pytest -m slow --numprocesses auto --maxprocesses 4 --dist loadfile
 
 lint: setup  ## ruff and mypy --strict
 	@.venv/bin/ruff check

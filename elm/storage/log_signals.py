@@ -87,12 +87,18 @@ class Ear:
 def exclusive(dsn: str, memory: str, name: str) -> Iterator[None]:
     """Hold a consumer's name, by a connection of its own, as long as the context and that connection are open."""
     connection = open_connection(dsn, _HOLDING, memory=memory)
+    number = _lock_number(memory, name)
     try:
         with translated(memory):
-            row = connection.execute(log_statements.TRY_LOCK, [_lock_number(memory, name)]).fetchone()
+            row = connection.execute(log_statements.TRY_LOCK, [number]).fetchone()
         if row != (True,):
             raise consumer_busy(name)
-        yield
+        try:
+            yield
+        finally:
+            # A server lets go of what a closed connection held only when it has noticed.
+            with suppress(psycopg.Error):
+                connection.execute(log_statements.UNLOCK, [number])
     finally:
         connection.close()
 

@@ -79,6 +79,7 @@ ON CONFLICT (name) DO NOTHING
 NOTIFY = "SELECT set_config('synchronous_commit', 'off', true), pg_notify($1, '')"
 
 TRY_LOCK = "SELECT pg_try_advisory_lock(%s)"
+UNLOCK = "SELECT pg_advisory_unlock(%s)"
 
 
 def read() -> Select[tuple[object, ...]]:
