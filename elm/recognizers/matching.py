@@ -61,7 +61,8 @@ class Matching:
     def feed(self, fed: Fed) -> Sequence[Emission]:
         """Take in an event; those that matched because of it."""
         event = fed.event
-        self._end_silent(fed.moment)
+        if self._silent.may_begin_before(fed.moment):
+            self._end_silent(fed.moment)
         try:
             statics = self._by_type[event.type]
         except KeyError:

@@ -86,6 +86,7 @@ def told(run: Run) -> Any:
 
 
 def run_of(told: Any, held: Mapping[str, Fed]) -> Run:
+    """The run that `told` was told of."""
     taken: Taken | None = None
     count = 0
     for step, uid, place in told["taken"]:
@@ -128,6 +129,10 @@ class Queue:
         """Put a run in; `second` is like that of no other entry."""
         heappush(self._entries, (first, second, run))
 
+    def may_begin_before(self, number: int) -> bool:
+        """Whether some first number may be smaller: a quick look, before `first` tells."""
+        return bool(self._entries) and self._entries[0][0] < number
+
     def first(self) -> int | None:
         """The first number of the first run that counts."""
         entries, counts = self._entries, self._counts
@@ -141,6 +146,6 @@ class Queue:
 
     def tidy(self, held: int) -> None:
         """Keep few entries that do not count beside those of the runs held."""
-        if self.first() is not None and len(self._entries) > 2 * held + SPARE:
+        if len(self._entries) > 2 * held + SPARE:
             self._entries = [each for each in self._entries if self._counts(each[1], each[2])]
             heapify(self._entries)
