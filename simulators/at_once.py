@@ -10,10 +10,11 @@ from typing import Any
 from elm.errors import StoreFailure
 from elm.log import LogEntry
 from elm.recognition import Timing
-from elm.recognition.fold import Fold, Work
+from elm.recognition.fold import Fold
 from elm.recognition.judging import TypeJudge
 from elm.recognition.manager import BATCH
 from elm.recognition.strands import strands
+from elm.recognition.work import Work
 from elm.recognizers import Pattern
 from elm.recognizers.base import RECOGNIZER
 from elm.taxonomy import EventType

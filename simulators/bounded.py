@@ -16,10 +16,11 @@ from elm import cues
 from elm.errors import StoreFailure
 from elm.log import LogEntry
 from elm.recognition import Timing, checkpoint
-from elm.recognition.fold import Fold, Work
+from elm.recognition.fold import Fold
 from elm.recognition.judging import TypeJudge
 from elm.recognition.manager import BATCH
 from elm.recognition.strands import strands
+from elm.recognition.work import Work
 from elm.recognizers import AfterMatch, Pattern, step
 from simulators import handling
 from simulators.engine import KINDS, OBJECTS, STEPS

@@ -55,7 +55,7 @@ class TimingOptions:
     lateness: Annotated[
         float,
         typer.Option("--lateness", min=0, metavar=_SECONDS, help="How long after later ones events may arrive."),
-    ] = 0.0
+    ] = 1.0
     idle: Annotated[
         float,
         typer.Option(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -29,7 +30,7 @@ class Run:
     held: defaultdict[str, list[Fed]] = field(default_factory=lambda: defaultdict(list))
 
 
-class RunProcess:
+class RunProcess(ABC):
     """A process that looks at the runs of one agent, each in its frame, and says what it finds in them."""
 
     NUMBERS: ClassVar[Mapping[str, float]] = {}
@@ -37,13 +38,13 @@ class RunProcess:
 
     def __init__(self) -> None:
         self._runs: dict[str, Run] = {}
-        self._cut = 0
+        self._split = 0
 
     @classmethod
     def resumed(cls, snapshot: Any, held: Mapping[str, Fed]) -> Self:
         """The process of which `snapshot` was taken."""
         process = cls()
-        process._cut = snapshot["cut"]
+        process._split = snapshot["split"]
         for frame, told in snapshot["runs"].items():
             run = process._runs[frame] = Run(over_at=told["over_at"], found=told["found"])
             for role, uids in told["held"].items():
@@ -65,7 +66,7 @@ class RunProcess:
         found = [*self._take(run, fed)]
         if sum(map(len, run.held.values())) > MOST_HELD:
             found += self._end(region.frame)
-            self._cut += 1
+            self._split += 1
         return found
 
     def deadline(self) -> int | None:
@@ -87,7 +88,7 @@ class RunProcess:
             }
             for frame, run in self._runs.items()
         }
-        return {"runs": runs, "cut": self._cut}
+        return {"runs": runs, "split": self._split}
 
     def held(self) -> Sequence[Fed]:
         """The events of all runs."""
@@ -95,18 +96,18 @@ class RunProcess:
 
     def counts(self) -> Mapping[str, int]:
         """Runs under way, and how often one was ended for its bound."""
-        return {"partial": len(self._runs), "cut": self._cut}
+        return {"partial": len(self._runs), "split": self._split}
 
     def _end(self, frame: str) -> Sequence[Emission]:
         return self._over(self._runs.pop(frame))
 
+    @abstractmethod
     def _take(self, run: Run, fed: Fed) -> Iterable[Emission]:
         """What an event of a run completes."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _over(self, run: Run) -> Sequence[Emission]:
         """What the end of a run completes."""
-        raise NotImplementedError
 
 
 ProcessClass = type[RunProcess]

@@ -4,21 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from heapq import heappop, heappush
-from typing import Any
+from heapq import heappop
+from typing import Any, TypeVar
 from uuid import UUID
 
 from elm.event import StoredEvent
-from elm.interval import from_micros, to_micros
+from elm.interval import from_micros
 from elm.log import LogEntry, LogKind, Tick
-from elm.recognition.bench import Bench, RecognizerFailure, Tally
+from elm.recognition.bench import RecognizerFailure
 from elm.recognition.clocks import NEVER, Clocks, Timing
 from elm.recognition.results import Result, moment_of
-from elm.recognition.strands import Strand
-from elm.recognizers.base import RECOGNIZER, Fed, Judge
+from elm.recognition.waiting import Queue, Waiting, fed_at, keep, merge, push
+from elm.recognition.work import Work
+from elm.recognizers.base import RECOGNIZER, Fed
 
-MOST_HELD = 200_000
-"""Events that wait for their time at once, for one agent; more are passed over, and counted."""
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,69 +27,6 @@ class Taken:
 
     results: tuple[tuple[str, Result], ...]
     failures: tuple[tuple[str, RecognizerFailure], ...]
-
-
-class Work:
-    """One strand at work: a bench for each agent, one across agents, and what it counted."""
-
-    def __init__(self, strand: Strand, judge: Judge) -> None:
-        self.strand = strand
-        self.judge = judge
-        self.tally = Tally(strand)
-        self.benches: dict[str | None, Bench] = {}
-        self.across = Bench(strand, across=True, agent=None, judge=judge, tally=self.tally)
-        self.has_across = any(each.across_agents for each in strand.recognizers)
-        self._single = Bench(strand, across=False, agent=None, judge=judge, tally=self.tally)
-
-    def bench(self, agent: str | None) -> Bench:
-        """The bench of one agent."""
-        known = self.benches.get(agent)
-        if known is None:
-            known = Bench(self.strand, across=False, agent=agent, judge=self.judge, tally=self.tally)
-            self.benches[agent] = known
-        return known
-
-    def wants(self, type_name: str) -> bool:
-        """Whether a recognizer of single agents may want events of a type."""
-        return self._single.interested(type_name)
-
-    def wants_across(self, type_name: str) -> bool:
-        """Whether a recognizer across agents may."""
-        return self.across.interested(type_name)
-
-    def counts(self) -> dict[str, dict[str, int]]:
-        """What the processes count, summed over agents, by recognizer."""
-        found: dict[str, dict[str, int]] = {each.name: {} for each in self.strand.recognizers}
-        for bench in (*self.benches.values(), self.across):
-            for name, counted in bench.counts().items():
-                for what, number in counted.items():
-                    found[name][what] = found[name].get(what, 0) + number
-        return found
-
-
-_Queue = list[tuple[int, int, int, Fed]]
-"""A heap of events by moment, begin and uid."""
-
-
-class Waiting:
-    """The moments of all events that wait for one watermark, whoever wants them: so many may wait, no more."""
-
-    def __init__(self, moments: list[int]) -> None:
-        self.moments = moments
-
-    def passed(self, watermark: int) -> list[int]:
-        """The moments that still wait: those before the watermark do no longer."""
-        while self.moments and self.moments[0] < watermark:
-            heappop(self.moments)
-        return self.moments
-
-    def has_room(self, moment: int, watermark: int) -> bool:
-        """Whether one more event may wait."""
-        moments = self.passed(watermark)
-        if len(moments) >= MOST_HELD:
-            return False
-        heappush(moments, moment)
-        return True
 
 
 class Fold:
@@ -102,8 +39,8 @@ class Fold:
         self.works = {each.strand.name: each for each in works}
         self.clocks = Clocks(timing)
         self._own = own
-        self._queues: dict[str | None, _Queue] = {}
-        self._shared: _Queue = []
+        self._queues: dict[str | None, Queue] = {}
+        self._shared: Queue = []
         self._waiting: dict[str | None, Waiting] = {}
         self._waiting_across = Waiting([])
         self._wants: dict[str, tuple[tuple[Work, ...], tuple[Work, ...]]] = {}
@@ -173,7 +110,7 @@ class Fold:
             _count_passed_over(single)
         elif single and (not is_result or agent in self.clocks.agents):
             # What another consumer found across agents belongs to none whose time could come.
-            _push(self._queues.setdefault(agent, []), event, moment)
+            push(self._queues.setdefault(agent, []), event, moment)
         if not self._has_across:
             return
         if moment_across < shared and not self._complete:
@@ -181,7 +118,7 @@ class Fold:
         elif not self._has_room(self._waiting_across, moment_across, shared):
             _count_passed_over(across)
         elif across:
-            _push(self._shared, event, moment_across)
+            push(self._shared, event, moment_across)
 
     def _has_room(self, waiting: Waiting, moment: int, watermark: int) -> bool:
         return self._complete or waiting.has_room(moment, watermark)
@@ -207,9 +144,9 @@ class Fold:
         while self._shared and self._shared[0][0] < watermark:
             fed = heappop(self._shared)[3]
             for work in self._wanted(fed.event.type)[1]:
-                self._found(work, lambda work=work, fed=fed: work.across.feed(fed))  # type: ignore[misc]
+                self._found(work, work.across.feed, fed)
         for work in list(self.works.values()):
-            self._found(work, lambda work=work: work.across.pass_time(watermark))  # type: ignore[misc]
+            self._found(work, work.across.pass_time, watermark)
 
     def _settle_agent(self, agent: str | None) -> None:
         watermark = self.clocks.watermark(agent)
@@ -217,16 +154,16 @@ class Fold:
         while queue and queue[0][0] < watermark:
             fed = heappop(queue)[3]
             for work in self._wanted(fed.event.type)[0]:
-                bench = work.bench(agent)
-                if found := self._found(work, lambda bench=bench, fed=fed: bench.feed(fed)):  # type: ignore[misc]
+                if found := self._found(work, work.bench(agent).feed, fed):
                     self._share(found)
         for work in list(self.works.values()):
-            if (known := work.benches.get(agent)) is not None:
-                self._share(self._found(work, lambda bench=known: bench.pass_time(watermark)))  # type: ignore[misc]
+            if (bench := work.benches.get(agent)) is not None:
+                self._share(self._found(work, bench.pass_time, watermark))
 
-    def _found(self, work: Work, look: Callable[[], list[Result]]) -> list[Result]:
+    def _found(self, work: Work, look: Callable[[T], list[Result]], given: T) -> list[Result]:
+        """What a strand finds when it is given an event, or the time; a strand that fails is let go of."""
         try:
-            found = look()
+            found = look(given)
         except RecognizerFailure as failure:
             self._failures.append((work.strand.name, failure))
             self.remove(work.strand.name)
@@ -242,11 +179,8 @@ class Fold:
         for result in found:
             event = result.fed.event
             if self._wanted(event.type)[1]:
-                _push(
-                    self._shared,
-                    event,
-                    result.fed.moment if self._complete else max(result.fed.moment, self.clocks.shared),
-                )
+                moment = result.fed.moment
+                push(self._shared, event, moment if self._complete else max(moment, self.clocks.shared))
 
     def remove(self, name: str) -> None:
         """Let go of a strand, and of what waits for it alone: it will be fed anew when it is back."""
@@ -255,8 +189,8 @@ class Fold:
         self._wants.clear()
         self._has_across = any(each.has_across for each in self.works.values())
         for queue in self._queues.values():
-            _keep(queue, lambda fed: bool(self._wanted(fed.event.type)[0]))
-        _keep(self._shared, lambda fed: bool(self._wanted(fed.event.type)[1]))
+            keep(queue, lambda fed: bool(self._wanted(fed.event.type)[0]))
+        keep(self._shared, lambda fed: bool(self._wanted(fed.event.type)[1]))
         if not self._has_across:
             self.clocks.shared = NEVER
             self._waiting_across = Waiting([])
@@ -339,13 +273,13 @@ class Fold:
         self.clocks = Clocks.resumed(self.clocks.timing, told["clocks"])
         for agent, waiting in told["queues"]:
             for uid, moment in waiting:
-                _push(self._queues.setdefault(agent, []), named[uid], moment)
+                push(self._queues.setdefault(agent, []), named[uid], moment)
         for uid, moment in told["shared"]:
-            _push(self._shared, named[uid], moment)
+            push(self._shared, named[uid], moment)
         for agent, states, held in told["benches"]:
-            work.bench(agent).resume(states, {uid: _fed(named[uid], moment) for uid, moment in held})
+            work.bench(agent).resume(states, {uid: fed_at(named[uid], moment) for uid, moment in held})
         states, held = told["across"]
-        work.across.resume(states, {uid: _fed(named[uid], moment) for uid, moment in held})
+        work.across.resume(states, {uid: fed_at(named[uid], moment) for uid, moment in held})
         self._waiting = {agent: Waiting(moments) for agent, moments in told["waiting"]}
         self._waiting_across = Waiting(told["waiting_across"])
         work.tally.resume(told["tally"])
@@ -371,29 +305,8 @@ class Fold:
             self.clocks.shared = other.clocks.shared
             self._waiting_across = other._waiting_across
         for agent, queue in other._queues.items():
-            _merge(self._queues.setdefault(agent, []), queue)
-        _merge(self._shared, other._shared)
-
-
-def _push(queue: _Queue, event: StoredEvent, moment: int) -> None:
-    fed = _fed(event, moment)
-    heappush(queue, (moment, fed.begin, event.uid.int, fed))
-
-
-def _fed(event: StoredEvent, moment: int) -> Fed:
-    return Fed(event=event, moment=moment, begin=to_micros(event.interval.begin))
-
-
-def _keep(queue: _Queue, is_wanted: Callable[[Fed], bool]) -> None:
-    # What is sorted is a heap.
-    queue[:] = sorted(item for item in queue if is_wanted(item[3]))
-
-
-def _merge(into: _Queue, queue: _Queue) -> None:
-    known = {item[2] for item in into}
-    for item in queue:
-        if item[2] not in known:
-            heappush(into, item)
+            merge(self._queues.setdefault(agent, []), queue)
+        merge(self._shared, other._shared)
 
 
 def _count_late(works: Iterable[Work]) -> None:

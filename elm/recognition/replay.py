@@ -12,9 +12,10 @@ from elm.event import Event
 from elm.log import LoggedStore
 from elm.recognition.clocks import Timing
 from elm.recognition.enrolment import known_strands, refuse_changed
-from elm.recognition.fold import Fold, Taken, Work
+from elm.recognition.fold import Fold, Taken
 from elm.recognition.judging import TypeJudge
 from elm.recognition.manager import BATCH
+from elm.recognition.work import Work
 from elm.recognizers.base import DEADLINE, RECOGNIZER, VERSION, Recognizer
 from elm.store import Arrival, Query
 

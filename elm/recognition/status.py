@@ -10,7 +10,7 @@ from elm.cues.codec import cue_to_json
 from elm.interval import from_micros
 from elm.log import Consumer, Log
 from elm.recognition.clocks import Clocks
-from elm.recognition.fold import Work
+from elm.recognition.work import Work
 
 SHOWN = 100
 """Agents whose watermarks are told."""

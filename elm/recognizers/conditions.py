@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -30,7 +31,7 @@ PlaceName = Place | Literal["region", "subject"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Condition:
+class Condition(ABC):
     """Compares the event at hand with what `step` took; it holds where that step has taken nothing."""
 
     step: str
@@ -54,9 +55,9 @@ class Condition:
             case _:
                 assert_never(self.of)
 
+    @abstractmethod
     def between(self, event: StoredEvent, other: StoredEvent) -> bool:
         """Whether it holds for an event and one that was taken."""
-        raise NotImplementedError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

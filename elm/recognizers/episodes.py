@@ -52,11 +52,6 @@ class Session(Grouped):
         """What sessions are made of."""
         return self.cue
 
-    @property
-    def outputs(self) -> tuple[EventType, ...]:
-        """The type of its results."""
-        return self._types()
-
     def start(self, around: Judge) -> Process:
         """A process that has seen nothing yet."""
         return _Sessions(self, around)
@@ -215,11 +210,6 @@ class Repetition(Grouped):
     def interest(self) -> Cue:
         """What is repeated."""
         return self.cue
-
-    @property
-    def outputs(self) -> tuple[EventType, ...]:
-        """The type of its results."""
-        return self._types()
 
     def start(self, around: Judge) -> Process:
         """A process that has seen nothing yet."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Generic, Self, TypeVar
@@ -64,6 +65,11 @@ class Grouped:
     def definition(self) -> Any:
         """All that its results depend on, as plain JSON."""
         return plain(self)
+
+    @property
+    def outputs(self) -> tuple[EventType, ...]:
+        """The types of its results."""
+        return self._types()
 
     def measured(self, parts: Sequence[tuple[str, StoredEvent]]) -> tuple[Feature, ...]:
         """The features of a result of these parts, by name."""
@@ -129,7 +135,7 @@ class Group:
 Definition = TypeVar("Definition", bound=Grouped)
 
 
-class GroupedProcess(Generic[Definition]):
+class GroupedProcess(ABC, Generic[Definition]):
     """A `Process` that holds groups of events in the order of their deadlines.
 
     Subclasses say what an event does to the groups of a key and what the end of a group's time brings. A group
@@ -211,17 +217,17 @@ class GroupedProcess(Generic[Definition]):
         partial = sum(1 for group in self._groups.values() if group.held)
         return {"partial": partial, "dropped": self._dropped, "split": self._split}
 
+    @abstractmethod
     def _take(self, key: Key, fed: Fed) -> Sequence[Emission]:
         """What an event does to the groups of a key."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _tells(self, group: Group) -> bool:
         """Whether anything follows when the time of a group is over; else nobody need wait for that."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _over(self, group: Group) -> Sequence[Emission]:
         """What follows when the time of a group, which is no longer held, is over."""
-        raise NotImplementedError
 
     def _find(self, key: Key, *tag: str) -> Group | None:
         return self._groups.get((key, tag))

@@ -2,36 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from typing import Any, Self
 from uuid import UUID
 
-from elm.cues.algebra import Cue
 from elm.features import Feature, FeatureValue
 from elm.interval import from_micros
 from elm.recognizers.base import Emission, Fed, Judge
-from elm.recognizers.measures import Measure
+from elm.recognizers.hits import Hits
 from elm.recognizers.partition import Key, keys_of, values_of
-from elm.recognizers.plan import Plan, Target
-from elm.recognizers.runs import NOTHING, Queue, Run, Taken, run_of, taken_by, told
+from elm.recognizers.plan import Plan, Rules, Target
+from elm.recognizers.runs import NOTHING, Queue, Run, Taken, run_of, told
 
 MATCH, TIMED_OUT = "match", "timed out"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Rules:
-    """What a process needs to know of its pattern beside the plan; times in microseconds."""
-
-    type: str
-    timed_out: str | None
-    within: int
-    among: Cue | None
-    partition: tuple[str, ...]
-    bars_overlaps: bool
-    bars_same_start: bool
-    measures: Mapping[str, Measure]
-    most_runs: int
 
 
 class Matching:
@@ -73,7 +56,7 @@ class Matching:
         if among is not None and not self._around.matches(among, event):
             return ()
         self._place += 1
-        hits = _Hits(self._plan, self._around, fed, statics)
+        hits = Hits(self._plan, self._around, fed, statics)
         found: list[Emission] = []
         for key in keys_of(event, self._rules.partition):
             found += self._feed_one(key, fed, hits)
@@ -88,7 +71,7 @@ class Matching:
             return None
         return statics
 
-    def _feed_one(self, key: Key, fed: Fed, hits: _Hits) -> list[Emission]:
+    def _feed_one(self, key: Key, fed: Fed, hits: Hits) -> list[Emission]:
         certain: list[Run] = []
         self._has_ended = False
         runs = self._runs.get(key)
@@ -105,7 +88,7 @@ class Matching:
         self._clear(key)
         return found
 
-    def _offer(self, run: Run, fed: Fed, hits: _Hits, certain: list[Run]) -> None:
+    def _offer(self, run: Run, fed: Fed, hits: Hits, certain: list[Run]) -> None:
         """Have a run take the event, divide, or pass over it."""
         targets = self._plan.targets(run.taken[1], run.count)
         first = None
@@ -132,7 +115,7 @@ class Matching:
     def _targets(self, run: Run) -> tuple[Target, ...]:
         return self._plan.targets(run.taken[1], run.count)
 
-    def _is_possible(self, run: Run, target: Target, fed: Fed, hits: _Hits) -> bool:
+    def _is_possible(self, run: Run, target: Target, fed: Fed, hits: Hits) -> bool:
         if not hits.of(target.step) or (target.strict and run.passed):
             return False
         if fed.moment - min(run.begin, fed.begin) > self._rules.within:
@@ -174,7 +157,7 @@ class Matching:
                 return
         self._set_deadline(run, targets)
 
-    def _pass_over(self, run: Run, targets: tuple[Target, ...], hits: _Hits, certain: list[Run]) -> None:
+    def _pass_over(self, run: Run, targets: tuple[Target, ...], hits: Hits, certain: list[Run]) -> None:
         run.passed = True
         plan, step = self._plan, run.taken[1]
         met = [g for g in plan.guards_behind[step] if g not in run.closed and hits.of(g) and hits.holds(g, run.taken)]
@@ -276,25 +259,26 @@ class Matching:
         for run in sorted(certain, key=Run.rank):
             if run.start <= barred_to.get(run.key, 0) or (run.key, run.start) in barred:
                 continue
-            found.append(self._emission(run, MATCH, moment))
+            found.append(self._emission(run, MATCH, self._rules.type, moment))
             if self._rules.bars_overlaps:
                 barred_to[run.key] = run.taken[3]
-                self._bar(run.key, lambda other, last=run.taken[3]: other.start <= last)  # type: ignore[misc]
+                self._bar(run.key, 0, run.taken[3])
             elif self._rules.bars_same_start:
                 barred.add((run.key, run.start))
-                self._bar(run.key, lambda other, start=run.start: other.start == start)  # type: ignore[misc]
+                self._bar(run.key, run.start, run.start)
         return found
 
-    def _bar(self, key: Key, is_barred: Callable[[Run], bool]) -> None:
+    def _bar(self, key: Key, first: int, last: int) -> None:
+        """End the runs of a partition that began from one place to another."""
         for other in self._runs.get(key, ()):
-            if other.alive and is_barred(other):
+            if first <= other.start <= last:
                 self._end(other)
 
-    def _emission(self, run: Run, output: str, moment: int) -> Emission:
+    def _emission(self, run: Run, output: str, kind: str, moment: int) -> Emission:
         trail = run.trail()
         waited = output == TIMED_OUT or self._plan.absent is not None
         return Emission(
-            type=self._rules.type if output == MATCH or self._rules.timed_out is None else self._rules.timed_out,
+            type=kind,
             parts=tuple((self._plan.names[step], fed.event) for _, step, fed, _ in trail),
             output=output,
             key=values_of(run.key),
@@ -349,8 +333,9 @@ class Matching:
                 late.append(run)
         found = self._decided(certain, deadline) if certain else []
         for run in sorted(late, key=Run.rank):
-            if run.alive:
-                found.append(self._emission(run, TIMED_OUT, deadline))
+            # Only with a type for what timed out is a run that did not match waited for.
+            if run.alive and self._rules.timed_out is not None:
+                found.append(self._emission(run, TIMED_OUT, self._rules.timed_out, deadline))
                 self._end(run)
         for key in {run.key for run in due}:
             self._clear(key)
@@ -391,33 +376,3 @@ class Matching:
             process._hold(run)
             process._set_deadline(run, process._targets(run))
         return process
-
-
-class _Hits:
-    """Which atoms one event is, each judged once and when it is asked for."""
-
-    __slots__ = ("_around", "_event", "_known", "_plan")
-
-    def __init__(self, plan: Plan, around: Judge, fed: Fed, statics: tuple[bool | None, ...]) -> None:
-        self._plan = plan
-        self._around = around
-        self._event = fed.event
-        self._known: Any = statics
-
-    def of(self, atom: int) -> bool:
-        """Whether the event matches the atom's cue."""
-        known: bool | None = self._known[atom]
-        if known is None:
-            known = self._around.matches(self._plan.atoms[atom].cue, self._event)
-            if isinstance(self._known, tuple):
-                self._known = list(self._known)
-            self._known[atom] = known
-        return known
-
-    def holds(self, atom: int, taken: Taken | None) -> bool:
-        """Whether the atom's conditions hold for the event and what a run took."""
-        # Written out: most atoms have none, and all() of a generator takes its time for nothing.
-        for condition, step in self._plan.atoms[atom].conditions:
-            if not condition.holds(self._event, taken_by(step, taken)):
-                return False
-        return True

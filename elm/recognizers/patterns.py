@@ -13,10 +13,10 @@ from elm.errors import InvalidValue
 from elm.recognizers.base import DEADLINE, Fed, Judge, Process, check_count, check_identity
 from elm.recognizers.durations import check_duration, micros_of
 from elm.recognizers.elements import Absent, Contiguity, Element, Step, check_elements
-from elm.recognizers.matching import Matching, Rules
+from elm.recognizers.matching import Matching
 from elm.recognizers.measures import Measure, checked_measures
 from elm.recognizers.naming import ordered_names, parents_of
-from elm.recognizers.plan import plan
+from elm.recognizers.plan import Rules, plan
 from elm.recognizers.purity import check_pure
 from elm.recognizers.spelling import plain
 from elm.taxonomy import EventType

@@ -204,11 +204,6 @@ class Standstill(Grouped):
         """What tells where something was."""
         return self.cue
 
-    @property
-    def outputs(self) -> tuple[EventType, ...]:
-        """The type of its results."""
-        return self._types()
-
     def start(self, around: Judge) -> Process:
         """A process that has seen nothing yet."""
         return _Standstills(self, around)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -9,6 +10,7 @@ from elm.cues.algebra import Cue
 from elm.recognizers.conditions import Condition
 from elm.recognizers.durations import micros_of
 from elm.recognizers.elements import Absent, Contiguity, Step, Without
+from elm.recognizers.measures import Measure
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -62,6 +64,21 @@ class Plan:
         if count < self.least[step]:
             return self.again_or_ahead[step][:1]
         return self.again_or_ahead[step] if count < self.most[step] else self.ahead[step]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rules:
+    """What a process needs to know of its pattern beside the plan; times in microseconds."""
+
+    type: str
+    timed_out: str | None
+    within: int
+    among: Cue | None
+    partition: tuple[str, ...]
+    bars_overlaps: bool
+    bars_same_start: bool
+    measures: Mapping[str, Measure]
+    most_runs: int
 
 
 def plan(elements: Sequence[Element]) -> Plan:

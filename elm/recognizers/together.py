@@ -15,7 +15,6 @@ from elm.recognizers.durations import later, micros_of
 from elm.recognizers.grouped import Group, Grouped, GroupedProcess
 from elm.recognizers.naming import sorted_names
 from elm.recognizers.partition import Key, values_of
-from elm.taxonomy import EventType
 
 MOST_HELD = 10_000
 """Events of either kind that are held for each group, unless the definition says otherwise."""
@@ -60,11 +59,6 @@ class CoOccurrence(Grouped):
     def interest(self) -> Cue:
         """Events of both kinds."""
         return Or(args=(self.first, self.second))
-
-    @property
-    def outputs(self) -> tuple[EventType, ...]:
-        """The type of its results."""
-        return self._types()
 
     def start(self, around: Judge) -> Process:
         """A process that has seen nothing yet."""

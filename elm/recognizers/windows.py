@@ -16,7 +16,6 @@ from elm.recognizers.base import Emission, Fed, Judge, Process
 from elm.recognizers.durations import later, micros_of
 from elm.recognizers.grouped import MOST_PARTS, Grouped, alike
 from elm.recognizers.partition import Key, keys_of, values_of
-from elm.taxonomy import EventType
 
 Having = tuple[str, Comparison | str, FeatureValue]
 """A measured feature, how it must compare, and with what."""
@@ -66,11 +65,6 @@ class Windowed(Grouped):
     def interest(self) -> Cue:
         """What is measured."""
         return self.cue
-
-    @property
-    def outputs(self) -> tuple[EventType, ...]:
-        """The type of its results."""
-        return self._types()
 
     def holds(self, features: Sequence[Feature]) -> bool:
         """Whether what was measured compares as asked; what could not be measured does not."""

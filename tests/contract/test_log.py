@@ -32,6 +32,7 @@ from elm.store import Arrival, Query
 from elm.taxonomy import EventType
 from tests.clock import at, span
 from tests.conftest import StoreFactory
+from tests.stories import story
 
 COMMIT, OPEN, CLOSE = LogKind.COMMIT, LogKind.OPEN, LogKind.CLOSE
 
@@ -170,22 +171,11 @@ def test_clocks_have_entries_of_their_own(memory: Memory) -> None:
         memory.punctuate(datetime(2026, 1, 1))  # noqa: DTZ001 - a naive one is the point
 
 
-def _story(chance: random.Random) -> list[Event]:
-    """Events, many of them still going on, and wholes over earlier ones."""
-    events: list[Event] = []
-    for _ in range(60):
-        if len(events) > 3 and chance.random() < 0.5:
-            events.append(thing(*chance.sample(events, 3)))
-        else:
-            events.append(thing(end=chance.choice([None, 1])))
-    return events
-
-
 @pytest.mark.parametrize("seed", range(3))
 def test_positions_are_dense_and_causal(memory: Memory, seed: int) -> None:
     """Whoever asks for the head, and when; parts come and close before their wholes, each once."""
     chance = random.Random(seed)
-    events = _story(chance)
+    events = story(chance, thing)
     going_on = [event.uid for event in events if event.interval and event.interval.is_open]
     for event in events:
         chance.choice(list(WRITES.values()))(memory, [event])

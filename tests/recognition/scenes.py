@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from datetime import datetime, timedelta
 from random import Random
+from typing import Any
 from uuid import UUID
 
 from elm import cues
 from elm.event import Event
 from elm.interval import Interval
 from elm.log import LoggedStore
-from elm.recognizers import Pattern, Recognizer, absent, same, step, sum_of, without
+from elm.recognizers import Emission, Fed, Pattern, Recognizer, absent, same, step, sum_of, without
 from elm.recognizers.base import RECOGNIZER
 from elm.store import Query
 from elm.taxonomy import EventType
@@ -19,6 +21,25 @@ from tests.clock import at
 SECOND = timedelta(seconds=1)
 TYPES = [EventType(name="A"), EventType(name="B"), EventType(name="C"), EventType(name="A1", parents=("A",))]
 AGENTS = ("r1", "r2", None)
+
+
+class Stateless:
+    """The part of a process that has nothing to keep and waits for nothing."""
+
+    def deadline(self) -> int | None:
+        return None
+
+    def expire(self, moment: int) -> Sequence[Emission]:
+        return ()
+
+    def snapshot(self) -> Any:
+        return None
+
+    def held(self) -> Sequence[Fed]:
+        return ()
+
+    def counts(self) -> Mapping[str, int]:
+        return {}
 
 
 def recognizers() -> list[Recognizer]:

@@ -24,6 +24,7 @@ from elm.recognizers import Emission, Fed, Pattern, Recognizer, absent, step
 from elm.store import Arrival, Query
 from elm.taxonomy import EventType
 from tests.clock import at
+from tests.recognition.scenes import Stateless
 
 SECOND = timedelta(seconds=1)
 
@@ -58,7 +59,7 @@ class Odd:
         return OddProcess(self.does)
 
 
-class OddProcess:
+class OddProcess(Stateless):
     """Without state."""
 
     def __init__(self, does: Any) -> None:
@@ -66,21 +67,6 @@ class OddProcess:
 
     def feed(self, fed: Fed) -> Sequence[Emission]:
         return self._does(fed.event)  # type: ignore[no-any-return]
-
-    def deadline(self) -> int | None:
-        return None
-
-    def expire(self, moment: int) -> Sequence[Emission]:
-        return ()
-
-    def snapshot(self) -> Any:
-        return None
-
-    def held(self) -> Sequence[Fed]:
-        return ()
-
-    def counts(self) -> Mapping[str, int]:
-        return {}
 
 
 PAIR: Recognizer = Pattern(

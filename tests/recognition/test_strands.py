@@ -6,7 +6,9 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
+from threading import Event as Signal
 from typing import Any
+from uuid import uuid4
 
 import pytest
 
@@ -25,6 +27,7 @@ from elm.storage.memory import MemoryStore
 from elm.store import Query
 from elm.taxonomy import EventType
 from tests.clock import at
+from tests.recognition.scenes import Stateless
 
 SECOND = timedelta(seconds=1)
 AT_ONCE = Timing(lateness=timedelta(0))
@@ -57,7 +60,7 @@ def until(holds: Callable[[], bool]) -> None:
 
 
 @dataclass(kw_only=True)
-class Watched:
+class Watched(Stateless):
     """Emits what it is fed, or raises while it is told to; remembers the moments."""
 
     name: str = "watched"
@@ -80,21 +83,6 @@ class Watched:
             raise RuntimeError("down")
         self.moments.append(fed.moment)
         return [Emission(type="Seen", parts=(("x", fed.event),))]
-
-    def deadline(self) -> int | None:
-        return None
-
-    def expire(self, moment: int) -> Sequence[Emission]:
-        return ()
-
-    def snapshot(self) -> Any:
-        return None
-
-    def held(self) -> Sequence[Fed]:
-        return ()
-
-    def counts(self) -> Mapping[str, int]:
-        return {}
 
 
 def test_a_strand_that_begins_later_does_not_share_its_ignorance(memory: Memory) -> None:
@@ -248,3 +236,51 @@ def test_a_rewound_consumer_begins_anew_while_it_is_at_work(memory: Memory) -> N
     memory.punctuate(at(200), agent="r")
     until(lambda: len(found(memory, "Of.s")) == 2)
     manager.stop()
+
+
+@dataclass(kw_only=True)
+class Told(Watched):
+    """Does with an event what a function says."""
+
+    does: Callable[[StoredEvent], Sequence[Emission]]
+
+    def feed(self, fed: Fed) -> Sequence[Emission]:
+        return self.does(fed.event)
+
+
+def test_a_slow_strand_that_fails_while_the_others_are_busy_loses_nothing(memory: Memory) -> None:
+    calls: list[StoredEvent] = []
+    others_are_busy = Signal()
+
+    def slow(event: StoredEvent) -> Sequence[Emission]:
+        calls.append(event)
+        if len(calls) == 1:
+            time.sleep(1.1)
+        if len(calls) == 2:
+            others_are_busy.wait(10)
+            unknown = StoredEvent(
+                id=0, uid=uuid4(), type="A", interval=event.interval, recorded_at=event.recorded_at, agent="r"
+            )
+            return [Emission(type="Seen", parts=(("x", unknown),))]
+        return [Emission(type="Seen", parts=(("x", event),))]
+
+    def busy(event: StoredEvent) -> Sequence[Emission]:
+        others_are_busy.set()
+        time.sleep(0.35)
+        return ()
+
+    put(memory, "A", 0)
+    memory.punctuate(at(1), agent="r")
+    first = Told(name="slow", does=slow, across_agents=False)
+    second = Told(name="busy", does=busy, across_agents=False, interest=cues.exactly("B"), outputs=())
+    manager = RecognitionManager(memory.store, [first, second])
+    manager.start()
+    until(lambda: len(found(memory, "Seen")) == 1)
+    put(memory, "A", 10)
+    memory.punctuate(at(20), agent="r")
+    until(lambda: len(calls) == 2)
+    put(memory, "B", 21)
+    memory.punctuate(at(30), agent="r")
+    until(lambda: len(found(memory, "Seen")) == 2)
+    manager.stop()
+    assert {each.name: each.failures for each in manager.status()} == {"slow": 1, "busy": 0}

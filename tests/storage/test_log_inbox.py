@@ -21,6 +21,7 @@ from elm.store import Arrival
 from elm.taxonomy import EventType
 from tests.clock import at, span
 from tests.servers import MEMORY
+from tests.stories import story
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -250,22 +251,11 @@ def test_close_has_one_entry_for_each_whole_that_closes_by_it(inbox: Inbox) -> N
     ]
 
 
-def _story(chance: random.Random) -> list[Event]:
-    """Events, many of them still going on, and wholes over earlier ones."""
-    events: list[Event] = []
-    for _ in range(60):
-        if len(events) > 3 and chance.random() < 0.5:
-            events.append(thing(*chance.sample(events, 3)))
-        else:
-            events.append(thing(end=chance.choice([None, 1])))
-    return events
-
-
 @pytest.mark.parametrize("seed", range(3))
 def test_parts_stand_before_their_wholes(inbox: Inbox, seed: int) -> None:
     """Of each kind there is one entry for an event, behind those of its parts, and closes stand behind commits."""
     chance = random.Random(seed)
-    events = _story(chance)
+    events = story(chance, thing)
     for number, event in enumerate(events, start=1):
         again = chance.randrange(4)
         chance.choice(list(WRITES.values()))(inbox.store, [*events[max(0, number - 1 - again) : number - 1], event])

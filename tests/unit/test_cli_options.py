@@ -236,3 +236,10 @@ def test_a_group_of_options_is_one_parameter() -> None:
     ]
     shown = runner.invoke(app, ["--help"]).output
     assert all(option in shown for option in ("--front", "--back", "--coats", "Paint something."))
+
+
+def test_recognition_waits_alike_from_the_shell_and_from_python() -> None:
+    from elm.cli.recognition_options import TimingOptions
+    from elm.recognition import Timing
+
+    assert TimingOptions().read() == Timing()
