@@ -8,18 +8,24 @@ from types import MappingProxyType
 
 COMMANDS = MappingProxyType(
     {
-        "insert": "time of one commit against a bare insert, and of a load against a bare COPY",
-        "recall": "time of each class of cues against the best statement written by hand",
-        "recognize": "rates, latency and memory of recognition against BoboCEP, a load and a bare commit",
-        "types": "time of loading a large type hierarchy against a bare COPY of its tables",
+        "insert": (
+            "simulators.writing.insert",
+            "time of a commit and of a load against a bare insert and a bare COPY",
+        ),
+        "types": (
+            "simulators.writing.wordnet",
+            "time of loading a large type hierarchy against a bare COPY",
+        ),
+        "recall": ("simulators.recalling.recall", "time of each class of cues against the best statement by hand"),
+        "recognize": ("simulators.recognizing.recognize", "rates, latency and memory of recognition"),
     }
 )
-"""The commands, each a module of this package with a function `main(argv)`, and what they measure."""
+"""The commands: the module of each, with a function `main(argv)`, and what it does."""
 
 
 def usage() -> str:
     """How the simulators are called."""
-    lines = [f"  {name:<9} {purpose}" for name, purpose in COMMANDS.items()]
+    lines = [f"  {name:<9} {purpose}" for name, (_, purpose) in COMMANDS.items()]
     return "\n".join(["usage: python -m simulators COMMAND [--json FILE] ...", "", "commands:", *lines])
 
 
@@ -30,7 +36,8 @@ def main(argv: list[str]) -> int:
             print(usage())
             return 0
         case [name, *rest] if name in COMMANDS:
-            code: int = import_module(f"simulators.{name}").main(rest)
+            module, _ = COMMANDS[name]
+            code: int = import_module(module).main(rest)
             return code
         case _:
             print(usage(), file=sys.stderr)

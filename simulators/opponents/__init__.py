@@ -1,1 +1,1 @@
-"""What elm is compared with, each run by an interpreter of its own: nothing of elm imports it, nor it elm."""
+"""elm beside the stores that a user would pick instead: the same events, the same questions, the same answers."""

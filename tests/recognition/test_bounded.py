@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from simulators import bounded
+from simulators.recognizing import bounded
 
 EVENTS = 1_000_000
 

@@ -17,8 +17,8 @@ from elm.recognition import Timing
 from elm.recognition.status import RecognizerStatus
 from elm.recognizers import Pattern, step
 from elm.taxonomy import EventType
-from simulators import hierarchy
-from simulators.events import simulate
+from simulators.worlds import hierarchy
+from simulators.worlds.events import simulate
 from tests.conftest import StoreFactory
 
 EVENTS = 2_000

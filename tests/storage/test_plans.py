@@ -21,8 +21,8 @@ from elm.interval import Interval
 from elm.storage import recall_statements
 from elm.storage.postgres import PostgresStore
 from elm.store import Arrival, Cursor, Nearest, Order, Query
-from simulators import hierarchy
-from simulators.events import World, simulate
+from simulators.worlds import hierarchy
+from simulators.worlds.events import World, simulate
 from tests.servers import MEMORY, Server
 
 EVENTS = 100_000

@@ -19,15 +19,17 @@ import elm
 from elm import cues
 from elm.errors import StoreFailure
 from elm.interval import Interval
-from simulators import at_once, bounded, engine, habits, hand_sql, handling, hierarchy
 from simulators.__main__ import main
-from simulators.classes import check_same
-from simulators.events import simulate
-from simulators.queries import CLASSES
-from simulators.report import Goal
-from simulators.scratch import bare_schema, connect, scratch_memory, with_setting
-from simulators.timing import in_milliseconds, in_turn, mean_ratio, median_ratio
-from simulators.twins import Twins
+from simulators.bench.findings import Goal
+from simulators.bench.scratch import bare_schema, connect, scratch_memory, with_setting
+from simulators.bench.timing import in_milliseconds, in_turn, mean_ratio, median_ratio
+from simulators.bench.twins import Twins
+from simulators.recalling import hand_sql
+from simulators.recalling.classes import check_same
+from simulators.recognizing import at_once, bounded, engine
+from simulators.worlds import habits, handling, hierarchy
+from simulators.worlds.events import simulate
+from simulators.worlds.queries import CLASSES
 from tests.servers import Server
 
 HAS_PYARROW = importlib.util.find_spec("pyarrow") is not None

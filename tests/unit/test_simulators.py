@@ -25,9 +25,9 @@ from elm.storage.memory import MemoryStore
 from elm.store import Arrival, Order, Query
 from elm.taxonomy import EventType, Taxonomy
 from simulators import __main__ as command_line
-from simulators import hierarchy, vocabulary
-from simulators.events import World, simulate
-from simulators.queries import CLASSES, classes_of, cue_of, simulate_queries
+from simulators.worlds import hierarchy, vocabulary
+from simulators.worlds.events import World, simulate
+from simulators.worlds.queries import CLASSES, classes_of, cue_of, simulate_queries
 
 COUNT = 20_000
 

@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from elm.errors import StoreFailure
-from simulators import handling
-from simulators.timing import in_turn
+from simulators.bench.timing import in_turn
+from simulators.worlds import handling
 
 STEPS = ("Grasp", "Carry", "Place")
 KINDS = (*STEPS, "Look", "Speak", "Bump")
@@ -25,11 +25,11 @@ PAUSE = 0.1
 WITHIN = 30_000_000
 """Microseconds from the first step to the last."""
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 ENVIRONMENT = ROOT / ".opponents" / "bobocep"
 """Where `make opponents` puts BoboCEP."""
 MISSING = "BoboCEP is not installed: run `make opponents`, then this again"
-_SCRIPT = Path(__file__).parent / "opponents" / "bobocep_sequence.py"
+_SCRIPT = Path(__file__).parent / "bobocep_sequence.py"
 
 
 def measure(*, events: int, rounds: int, seed: int, advance: Callable[[int], None]) -> dict[str, Any]:
@@ -43,7 +43,7 @@ def measure(*, events: int, rounds: int, seed: int, advance: Callable[[int], Non
     bobocep = ENVIRONMENT / "bin" / "python"
     times: dict[str, list[float]] = {"elm": []}
     with ExitStack() as opened:
-        sides = {"elm": opened.enter_context(_side([sys.executable, "-m", "simulators.sequence"], work))}
+        sides = {"elm": opened.enter_context(_side([sys.executable, "-m", "simulators.recognizing.sequence"], work))}
         if bobocep.exists():
             for name in ("together", "divided"):
                 asked = {**work, "divided": name == "divided"}

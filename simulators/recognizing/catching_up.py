@@ -16,10 +16,10 @@ from elm.event import Event
 from elm.recognition import Timing
 from elm.recognizers import Pattern, count, step
 from elm.writer import LOAD_BATCH
-from simulators import hierarchy
-from simulators.events import simulate
-from simulators.scratch import scratch_memory
-from simulators.timing import seconds, steady_heap
+from simulators.bench.scratch import scratch_memory
+from simulators.bench.timing import seconds, steady_heap
+from simulators.worlds import hierarchy
+from simulators.worlds.events import simulate
 
 TIMING = Timing(lateness=timedelta(minutes=2), simulated=True)
 """No simulated event lasts longer, so none is late."""

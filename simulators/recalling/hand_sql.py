@@ -8,7 +8,7 @@ from typing import Any
 from elm.event import StoredEvent
 from elm.features import name_tokens, tokens
 from elm.storage.connections import RECALLING, open_connection
-from simulators.scratch import Connection, connect
+from simulators.bench.scratch import Connection, connect
 
 # Regions as they are stored: in psycopg's binary results that is their WKB.
 COLUMNS = """

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from elm.event import Event, Payload
 from elm.geometry import DEFAULT_FRAME, Region
 from elm.interval import Interval, from_micros, to_micros
-from simulators import hierarchy, vocabulary
+from simulators.worlds import hierarchy, vocabulary
 
 PARTS = 9
 """Atomic events before each complex one, which has them as its parts."""

@@ -1,4 +1,4 @@
-"""elm's engine at the sequence that engines are compared by: a process, asked by `simulators.engine`.
+"""elm's engine at the sequence that engines are compared by: a process, asked by `simulators.recognizing.engine`.
 
 The first line of stdin tells of the work, as JSON. For each line after it all events are fed once to a process
 that has seen nothing, and a line of JSON says in how many seconds and with how many matches.
@@ -17,8 +17,8 @@ from elm import cues
 from elm.recognition.judging import TypeJudge
 from elm.recognizers import AfterMatch, Fed, Pattern, step
 from elm.recognizers.base import Judge
-from simulators import handling
-from simulators.handling import Done
+from simulators.worlds import handling
+from simulators.worlds.handling import Done
 
 
 def sequence(steps: Sequence[str], within: int) -> Pattern:

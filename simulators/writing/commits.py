@@ -13,10 +13,10 @@ from typing import Any
 import elm
 from elm.errors import StoreFailure
 from elm.event import Event
-from simulators import hierarchy
-from simulators.events import PARTS, simulate
-from simulators.scratch import bare_schema, connect, scratch_memory, with_setting
-from simulators.timing import in_milliseconds, in_turn, mean_ratio, median_ratio, seconds, steady_heap
+from simulators.bench.scratch import bare_schema, connect, scratch_memory, with_setting
+from simulators.bench.timing import in_milliseconds, in_turn, mean_ratio, median_ratio, seconds, steady_heap
+from simulators.worlds import hierarchy
+from simulators.worlds.events import PARTS, simulate
 
 MODES = {"durable": "on", "relaxed": "off"}
 """What is measured, and the `synchronous_commit` that it is measured with."""

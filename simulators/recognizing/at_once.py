@@ -18,8 +18,8 @@ from elm.recognition.work import Work
 from elm.recognizers import Pattern
 from elm.recognizers.base import RECOGNIZER
 from elm.taxonomy import EventType
-from simulators import habits, handling
-from simulators.timing import in_turn, seconds, steady_heap
+from simulators.bench.timing import in_turn, seconds, steady_heap
+from simulators.worlds import habits, handling
 
 
 def measure(*, events: int, rounds: int, seed: int, advance: Callable[[int], None]) -> dict[str, Any]:

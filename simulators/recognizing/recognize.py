@@ -8,10 +8,10 @@ from typing import Any
 
 from rich.table import Table
 
-from simulators import at_once, bounded, catching_up, engine, latency
-from simulators.measurement import options, run
-from simulators.progress import progress
-from simulators.report import Goal, Report, table_of
+from simulators.bench.findings import Goal, Report, table_of
+from simulators.bench.measurement import options, run
+from simulators.bench.progress import progress
+from simulators.recognizing import at_once, bounded, catching_up, engine, latency
 
 EVENTS, QUICK_EVENTS = 20_000, 1_000
 STREAM, QUICK_STREAM = 1_000_000, 20_000

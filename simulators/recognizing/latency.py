@@ -22,8 +22,8 @@ from elm.interval import Interval
 from elm.recognition import Timing
 from elm.recognizers import Pattern, step
 from elm.taxonomy import EventType
-from simulators.scratch import Connection, bare_schema, connect, scratch_memory, with_setting
-from simulators.timing import in_milliseconds, in_turn, seconds, steady_heap
+from simulators.bench.scratch import Connection, bare_schema, connect, scratch_memory, with_setting
+from simulators.bench.timing import in_milliseconds, in_turn, seconds, steady_heap
 
 FIRST, LAST, WHOLE = "Grasp", "Place", "Moved"
 WARM_UP = 5
@@ -139,11 +139,11 @@ def _beside(dsn: str, memory: elm.Memory) -> Iterator[None]:
 def _apart(dsn: str, memory: elm.Memory) -> Iterator[None]:
     """A manager in a process of its own, until stdin of that is closed."""
     with subprocess.Popen(  # noqa: S603 - our own program
-        [sys.executable, "-m", "simulators.latency", dsn, memory.name],
+        [sys.executable, "-m", "simulators.recognizing.latency", dsn, memory.name],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
-        cwd=Path(__file__).parents[1],
+        cwd=Path(__file__).parents[2],
     ) as process:
         assert process.stdin is not None  # noqa: S101 - both are pipes
         assert process.stdout is not None  # noqa: S101

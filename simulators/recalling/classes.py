@@ -14,10 +14,10 @@ import elm
 from elm.cues.algebra import Cue
 from elm.errors import StoreFailure
 from elm.event import StoredEvent
-from simulators import hand_sql
-from simulators.queries import CLASSES, cue_of
-from simulators.scratch import Connection
-from simulators.timing import in_turn, seconds
+from simulators.bench.scratch import Connection
+from simulators.bench.timing import in_turn, seconds
+from simulators.recalling import hand_sql
+from simulators.worlds.queries import CLASSES, cue_of
 
 SMALL_ANSWER = 1_000
 """Rows up to which the goal for a class holds, and a call is short enough to be timed several times."""

@@ -10,7 +10,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from simulators.scratch import connect
+from simulators.bench.scratch import connect
 
 _PACKAGES = ("elm-memory", "psycopg", "sqlalchemy", "numpy", "shapely", "pyarrow", "adbc-driver-postgresql")
 _SETTINGS = """

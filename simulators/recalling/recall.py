@@ -9,15 +9,16 @@ from typing import Any
 from rich.table import Table
 
 import elm
-from simulators import classes, hand_sql, hierarchy, rates
-from simulators.classes import SMALL_ANSWER, Answers
-from simulators.events import simulate
-from simulators.measurement import options, run
-from simulators.progress import progress
-from simulators.queries import CLASSES
-from simulators.report import Goal, Report, table_of
-from simulators.scratch import scratch_memory
-from simulators.timing import steady_heap
+from simulators.bench.findings import Goal, Report, table_of
+from simulators.bench.measurement import options, run
+from simulators.bench.progress import progress
+from simulators.bench.scratch import scratch_memory
+from simulators.bench.timing import steady_heap
+from simulators.recalling import classes, hand_sql, rates
+from simulators.recalling.classes import SMALL_ANSWER, Answers
+from simulators.worlds import hierarchy
+from simulators.worlds.events import simulate
+from simulators.worlds.queries import CLASSES
 
 EVENTS, QUICK_EVENTS = 100_000, 2_000
 CUES, QUICK_CUES = 30, 3

@@ -7,10 +7,10 @@ from typing import Any
 
 from rich.table import Table
 
-from simulators import commits, loads
-from simulators.measurement import options, run
-from simulators.progress import progress
-from simulators.report import Goal, Report, table_of
+from simulators.bench.findings import Goal, Report, table_of
+from simulators.bench.measurement import options, run
+from simulators.bench.progress import progress
+from simulators.writing import commits, loads
 
 EVENTS = 10_000
 QUICK_EVENTS = 200

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from psycopg import sql
 
-from simulators.scratch import Connection, bare_schema
+from simulators.bench.scratch import Connection, bare_schema
 
 _COLUMNS = """
 SELECT column_name FROM information_schema.columns

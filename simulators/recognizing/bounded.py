@@ -22,8 +22,8 @@ from elm.recognition.manager import BATCH
 from elm.recognition.strands import strands
 from elm.recognition.work import Work
 from elm.recognizers import AfterMatch, Pattern, step
-from simulators import handling
-from simulators.engine import KINDS, OBJECTS, STEPS
+from simulators.recognizing.engine import KINDS, OBJECTS, STEPS
+from simulators.worlds import handling
 
 HORIZON = timedelta(seconds=60)
 PAUSE = 0.03
@@ -37,11 +37,11 @@ STAGES = (0.1, 0.5, 1.0)
 def measure(*, events: int, seed: int) -> dict[str, Any]:
     """What is held at each stage, and by how much the peak of memory grew from the first stage to the last."""
     done = subprocess.run(  # noqa: S603 - our own program
-        [sys.executable, "-m", "simulators.bounded", str(events), str(seed)],
+        [sys.executable, "-m", "simulators.recognizing.bounded", str(events), str(seed)],
         stdout=subprocess.PIPE,
         text=True,
         check=False,
-        cwd=Path(__file__).parents[1],
+        cwd=Path(__file__).parents[2],
     )
     if done.returncode:
         raise StoreFailure("the process whose memory is measured ended with an error: see what it wrote above")

@@ -1,4 +1,4 @@
-"""BoboCEP at the sequence that engines are compared by: a process of its own environment, asked by `simulators.engine`.
+"""BoboCEP at the sequence that engines are compared by: a process of its own environment, asked by `engine`.
 
 The first line of stdin tells of the work, as JSON. For each line after it all events are fed once to an engine
 that has seen nothing, and a line of JSON says in how many seconds and with how many matches.

@@ -13,10 +13,10 @@ from psycopg.types.string import ByteaBinaryLoader
 import elm
 from elm.errors import StoreFailure
 from elm.event import StoredEvent
-from simulators import hand_sql
-from simulators.classes import fetch
-from simulators.scratch import Connection
-from simulators.timing import in_turn, seconds
+from simulators.bench.scratch import Connection
+from simulators.bench.timing import in_turn, seconds
+from simulators.recalling import hand_sql
+from simulators.recalling.classes import fetch
 
 SIDES = {
     "objects": "Event objects",

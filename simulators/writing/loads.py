@@ -12,11 +12,11 @@ from typing import Any
 import elm
 from elm.errors import StoreFailure
 from elm.writer import LOAD_BATCH
-from simulators import hierarchy
-from simulators.events import simulate
-from simulators.scratch import connect, scratch_memory
-from simulators.timing import seconds, steady_heap
-from simulators.twins import Twins
+from simulators.bench.scratch import connect, scratch_memory
+from simulators.bench.timing import seconds, steady_heap
+from simulators.bench.twins import Twins
+from simulators.worlds import hierarchy
+from simulators.worlds.events import simulate
 
 _BATCHES = 3
 """Batches at least: too few events for as many whole ones make smaller ones."""

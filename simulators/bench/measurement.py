@@ -11,9 +11,9 @@ from time import perf_counter
 from rich.console import Console
 
 from elm.errors import ElmError
-from simulators.machine import circumstances, load_average
-from simulators.report import Report
-from simulators.scratch import database
+from simulators.bench.findings import Report
+from simulators.bench.machine import circumstances, load_average
+from simulators.bench.scratch import database
 
 SEED = 1
 

@@ -16,12 +16,12 @@ import elm
 from elm.errors import StoreFailure
 from elm.taxonomy import EventType, parents_first
 from elm.wordnet import read_wordnet
-from simulators.measurement import options, run
-from simulators.progress import progress
-from simulators.report import Goal, Report, table_of
-from simulators.scratch import connect, scratch_memory
-from simulators.timing import seconds, steady_heap
-from simulators.twins import Twins
+from simulators.bench.findings import Goal, Report, table_of
+from simulators.bench.measurement import options, run
+from simulators.bench.progress import progress
+from simulators.bench.scratch import connect, scratch_memory
+from simulators.bench.timing import seconds, steady_heap
+from simulators.bench.twins import Twins
 
 QUICK_TYPES = 2_000
 ROUNDS, QUICK_ROUNDS = 3, 1

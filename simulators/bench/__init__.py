@@ -1,0 +1,1 @@
+"""How everything is measured: options, clocks, scratch memories, circumstances, progress and findings."""

@@ -1,0 +1,1 @@
+"""The experiments of the paper's section VI, run again."""

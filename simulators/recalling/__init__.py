@@ -1,0 +1,1 @@
+"""Measurements of what recalling costs, class by class and row by row."""

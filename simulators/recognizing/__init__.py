@@ -1,0 +1,1 @@
+"""Measurements of what recognition costs: rates, latency and memory."""

@@ -1,0 +1,1 @@
+"""The report on all measurements, from the figures that they left."""

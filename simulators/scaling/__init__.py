@@ -1,0 +1,1 @@
+"""How the time of a commit and of a recall grows with the memory."""

@@ -1,0 +1,1 @@
+"""Measurements of what writing costs: commits, loads, type hierarchies."""
