@@ -18,6 +18,7 @@ from elm.taxonomy import EventType
 from elm.writer import LOAD_BATCH, LoadReport, Writer
 
 if TYPE_CHECKING:
+    from elm.forgetting import ForgettingReport
     from elm.recognition import RecognitionManager, Replay, Timing
     from elm.recognizers import Recognizer
 
@@ -81,6 +82,18 @@ class Memory:
     ) -> LoadReport:
         """Keep a long stream of events; see `Writer.load`."""
         return self.writer.load(events, progress=progress, refused=refused, batch=batch)
+
+    def forget(
+        self,
+        what: Cue | Iterable[UUID],
+        *,
+        dry_run: bool = False,
+        progress: Callable[[int], None] | None = None,
+    ) -> ForgettingReport:
+        """Forget the events that match a cue or have these uids, or say what would go; see `elm.forgetting.forget`."""
+        from elm.forgetting import forget
+
+        return forget(self.store, what, dry_run=dry_run, progress=progress)
 
     def recall(
         self,

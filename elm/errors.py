@@ -30,6 +30,10 @@ class ConflictingContent(ElmError, ValueError):
     """The uid is taken by an event of other content. Use a new uid, or commit the same content."""
 
 
+class ForgottenEvent(ElmError, LookupError):
+    """The uid is that of a forgotten event which still counts as a part. It cannot come back: use a new uid."""
+
+
 class ExtentRefused(ElmError, ValueError):
     """The extent given for a complex event is not the one its parts have. Leave it out: it derives."""
 

@@ -15,6 +15,10 @@ from elm.fields import Fields, base64_text, parse_uid, time_text
 from elm.geometry import Region
 from elm.interval import Interval, parse_time
 from elm.taxonomy import EventType
+from elm.tombstone import RunTombstone, Tombstone
+
+FORGOTTEN = "forgotten"
+"""The one key of a line that is a tombstone."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -94,6 +98,66 @@ def event_to_json(event: Event | StoredEvent) -> dict[str, Any]:
     return shown
 
 
+def is_tombstone(given: Any) -> bool:
+    """Whether a JSON value is the line of a tombstone rather than of an event."""
+    return isinstance(given, dict) and FORGOTTEN in given
+
+
+def tombstone_from_json(given: Any) -> Tombstone | RunTombstone:
+    """The tombstone a JSON object stands for: of an event where it has a uid, else of the rest of a forgetting."""
+    line = Fields(given, what="a tombstone")
+    fields = Fields(line.take(FORGOTTEN), what="a tombstone")
+    line.finish()
+    run, interval = parse_uid(fields.take("run"), what="'run' of a tombstone"), fields.take("interval")
+    found: Tombstone | RunTombstone
+    if fields.optional("uid") is not None:
+        found = Tombstone(
+            uid=parse_uid(fields.take("uid"), what="'uid' of a tombstone"),
+            interval=_interval(interval),
+            region=_region(fields.optional("region"), what="region"),
+            subject=_region(fields.optional("subject"), what="subject"),
+            agent=fields.optional("agent"),
+            run=run,
+        )
+    else:
+        found = RunTombstone(
+            run=run,
+            at=parse_time(fields.take("at"), what="'at' of a tombstone"),
+            events=fields.take("events"),
+            interval=None if interval is None else _interval(interval),
+            regions=_hulls(fields.items("regions"), what="regions"),
+            subjects=_hulls(fields.items("subjects"), what="subjects"),
+        )
+    fields.finish()
+    return found
+
+
+def tombstone_to_json(tombstone: Tombstone | RunTombstone) -> dict[str, Any]:
+    """The JSON object of a tombstone."""
+    interval = tombstone.interval
+    ends = None if interval is None else (interval.begin, interval.end)
+    span = None if ends is None else [None if end is None else time_text(end) for end in ends]
+    if isinstance(tombstone, Tombstone):
+        told: dict[str, Any] = {
+            "uid": str(tombstone.uid),
+            "interval": span,
+            "region": None if tombstone.region is None else region_to_json(tombstone.region),
+            "subject": None if tombstone.subject is None else region_to_json(tombstone.subject),
+            "agent": tombstone.agent,
+            "run": str(tombstone.run),
+        }
+    else:
+        told = {
+            "run": str(tombstone.run),
+            "at": time_text(tombstone.at),
+            "events": tombstone.events,
+            "interval": span,
+            "regions": [region_to_json(region) for region in tombstone.regions],
+            "subjects": [region_to_json(region) for region in tombstone.subjects],
+        }
+    return {FORGOTTEN: told}
+
+
 def region_to_json(region: Region) -> dict[str, Any]:
     """The JSON object of a region."""
     return {"frame": region.frame, "polygon": region.geojson}
@@ -130,6 +194,11 @@ def _region(given: Any, *, what: str) -> Region | None:
     region = Region.from_geojson(fields.take("polygon"), frame=fields.text("frame"))
     fields.finish()
     return region
+
+
+def _hulls(given: list[Any], *, what: str) -> tuple[Region, ...]:
+    found = [_region(each, what=what) for each in given]
+    return tuple(each for each in found if each is not None)
 
 
 def _pairs(given: Any) -> list[tuple[str, Any]]:

@@ -16,14 +16,18 @@ from elm.columns import without_extensions
 from elm.cues.algebra import And, UidCue
 from elm.errors import MissingPackage
 from elm.event import StoredEvent
-from elm.exchange import event_to_json, to_line
+from elm.exchange import event_to_json, to_line, tombstone_to_json
 from elm.fields import time_text
 from elm.geometry import Region
 from elm.recollector import Recollection
 from elm.store import Order, Query
+from elm.tombstone import RunTombstone, Tombstone
 
 _CHUNK = 1_000
 _Item = TypeVar("_Item")
+
+Exported = StoredEvent | Tombstone | RunTombstone
+"""What stands on the lines of an export."""
 
 CSV_COLUMNS = (
     *("id", "uid", "type", "begin", "end", "region", "region_frame", "subject", "subject_frame", "features", "agent"),
@@ -31,20 +35,33 @@ CSV_COLUMNS = (
 )
 
 
-def with_parts(recollection: Recollection) -> Iterator[StoredEvent]:
-    """The events of a recollection and all they are made of, in id order: parts stand before their wholes."""
+def with_parts(recollection: Recollection) -> Iterator[Exported]:
+    """The events of a recollection and all they are made of, in id order: parts stand before their wholes.
+
+    Before them come the tombstones of those parts that were forgotten; of all events all tombstones, also those
+    of each forgetting.
+    """
     store, query = recollection.store, replace(recollection.query, order=Order.ID)
     if query.cue == And() and query.limit is None and query.after is None:
-        yield from store.find(query)
+        events = store.find(query)
+        # The view that they come from is as of now: what is forgotten from here on is in it.
+        first = next(events, None)
+        yield from store.run_tombstones()
+        yield from store.tombstones()
+        if first is not None:
+            yield first
+        yield from events
         return
     ids: set[int] = set()
     known: set[UUID] = set()
+    found: set[UUID] = set()
     wanted: set[UUID] = set()
 
     def take(events: Iterable[StoredEvent]) -> None:
         for event in events:
             ids.add(event.id)
             known.add(event.uid)
+            found.add(event.uid)
             wanted.update(event.parts)
 
     take(recollection)
@@ -52,14 +69,17 @@ def with_parts(recollection: Recollection) -> Iterator[StoredEvent]:
         known |= missing
         for uids in _chunks(missing):
             take(store.find(Query(cue=UidCue(uids=tuple(uids)))))
+    for uids in _chunks(wanted - found):
+        yield from store.tombstones(uids)
     for chunk in _chunks(sorted(ids)):
         yield from store.get(chunk)
 
 
-def jsonl(events: Iterable[StoredEvent]) -> Iterator[bytes]:
+def jsonl(events: Iterable[Exported]) -> Iterator[bytes]:
     """One JSON object a line, in the exchange format that `elm load` reads."""
     for event in events:
-        yield to_line(event_to_json(event)).encode() + b"\n"
+        told = event_to_json(event) if isinstance(event, StoredEvent) else tombstone_to_json(event)
+        yield to_line(told).encode() + b"\n"
 
 
 def geojson(events: Iterable[StoredEvent]) -> Iterator[bytes]:

@@ -9,11 +9,14 @@ from pathlib import Path
 from typing import BinaryIO
 
 from elm.errors import ElmError, InvalidValue
-from elm.exchange import event_from_json, parse_json, type_from_json
+from elm.exchange import event_from_json, is_tombstone, parse_json, tombstone_from_json, type_from_json
 from elm.store import Arrival
 from elm.taxonomy import EventType
+from elm.tombstone import RunTombstone, Tombstone
 from elm.writer import Writer
 
+TOMBSTONES_AT_ONCE = 1_000
+"""Tombstones that are kept in one transaction."""
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 
 
@@ -28,13 +31,17 @@ class RefusedLine:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FileReport:
-    """What became of a file: events read, kept as new, there already, refused, and fields passed over by name."""
+    """What became of a file: events read, kept as new, there already, refused, and fields passed over by name.
+
+    `tombstones` were kept as new; those that were there already, or refused, count with the events.
+    """
 
     read: int
     new: int
     existing: int
     refused: int
     ignored: Mapping[str, int]
+    tombstones: int = 0
 
 
 def load_lines(
@@ -44,12 +51,12 @@ def load_lines(
     refused: Callable[[RefusedLine], None],
     progress: Callable[[int], None] | None = None,
 ) -> FileReport:
-    """Keep the event on each line; blank lines are passed over.
+    """Keep the event, or the tombstone, on each line; blank lines are passed over.
 
     `refused` is told of each line that could not be kept, in the order of the lines; `progress` the bytes dealt
     with, after each batch. Times of recording are kept; `id` and `wholes` of a result are counted and passed over.
     """
-    reading = _Reading(lines)
+    reading = _Reading(lines, writer)
 
     def batch_done(_: int) -> None:
         for line in reading.finish_batch():
@@ -63,9 +70,10 @@ def load_lines(
     return FileReport(
         read=reading.events,
         new=report.new,
-        existing=report.existing,
+        existing=report.existing + reading.existing_tombstones,
         refused=reading.refused,
         ignored=dict(reading.ignored),
+        tombstones=reading.tombstones,
     )
 
 
@@ -111,26 +119,49 @@ def read_types(lines: Iterable[bytes]) -> list[EventType]:
 class _Reading:
     """The lines of one load as arrivals, remembering for a batch which line each came from."""
 
-    def __init__(self, lines: Iterable[bytes]) -> None:
+    def __init__(self, lines: Iterable[bytes], writer: Writer) -> None:
         self._lines = lines
+        self._writer = writer
+        self._tombstones: list[tuple[int, bytes, Tombstone | RunTombstone]] = []
         self._origins: dict[int, tuple[int, bytes]] = {}
         self._refused: list[RefusedLine] = []
-        self.bytes = self.events = self.refused = 0
+        self.bytes = self.events = self.refused = self.tombstones = self.existing_tombstones = 0
         self.ignored: Counter[str] = Counter()
 
     def arrivals(self) -> Iterator[Arrival]:
         for number, line in _numbered(self._count_bytes()):
             self.events += 1
             try:
-                read = event_from_json(parse_json(line, what="the line"))
+                given = parse_json(line, what="the line")
+                if is_tombstone(given):
+                    self._tombstones.append((number, line, tombstone_from_json(given)))
+                    if len(self._tombstones) == TOMBSTONES_AT_ONCE:
+                        self._keep_tombstones()
+                    continue
+                read = event_from_json(given)
             except ElmError as error:
                 self._refused.append(RefusedLine(number=number, reason=str(error), line=line))
                 continue
             self.ignored.update(read.ignored)
+            if read.event.parts:
+                # Some of them may be tombstones.
+                self._keep_tombstones()
             arrival = Arrival(event=read.event, recorded_at=read.recorded_at)
             # By identity: two lines may hold equal events. The batch keeps its arrivals alive until it is done.
             self._origins[id(arrival)] = number, line
             yield arrival
+        self._keep_tombstones()
+
+    def _keep_tombstones(self) -> None:
+        if not self._tombstones:
+            return
+        report = self._writer.keep_tombstones([tombstone for _, _, tombstone in self._tombstones])
+        self.tombstones += report.new
+        self.existing_tombstones += report.existing
+        for refusal in report.refused:
+            number, line, _ = self._tombstones[refusal.index]
+            self._refused.append(RefusedLine(number=number, reason=refusal.reason, line=line))
+        self._tombstones.clear()
 
     def refuse(self, arrival: Arrival, reason: str) -> None:
         number, line = self._origins[id(arrival)]

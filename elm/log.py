@@ -36,8 +36,8 @@ class LogEntry:
     """One entry: its position (1, 2, 3 ... without gaps), when it was written, and what it tells.
 
     `at` is by the clock of who wrote it: of several writers a later entry may have the earlier time.
-    `event` is there for the kinds commit, open and close, as it stands when it is read; `deadline` for ticks
-    and punctuations.
+    `event` is there for the kinds commit, open and close, as it stands when it is read, unless it was forgotten;
+    `deadline` for ticks and punctuations.
     """
 
     position: int
@@ -46,6 +46,11 @@ class LogEntry:
     agent: str | None
     event: StoredEvent | None = None
     deadline: datetime | None = None
+
+    @property
+    def is_forgotten(self) -> bool:
+        """Whether the event it told of was forgotten since: consumers count such entries and pass them over."""
+        return self.event is None and self.kind in (LogKind.COMMIT, LogKind.OPEN, LogKind.CLOSE)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

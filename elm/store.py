@@ -15,6 +15,7 @@ from elm.event import Event, StoredEvent
 from elm.geometry import Region
 from elm.interval import as_utc, from_micros, to_micros
 from elm.taxonomy import EventType
+from elm.tombstone import Forgotten, RunTombstone, Tombstone
 
 MOST_ID = 2**63 - 1
 """Greatest id of an event, and most events that can be asked for."""
@@ -224,7 +225,10 @@ class TypesAdded:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Statistics:
-    """What a memory holds, in numbers; `bytes` is None where the store has no size."""
+    """What a memory holds, in numbers; `bytes` is None where the store has no size.
+
+    `forgotten` is how many events it has forgotten, `tombstones` how many of these still count as parts.
+    """
 
     events: int
     complex_events: int
@@ -237,6 +241,8 @@ class Statistics:
     last_begin: datetime | None
     last_recorded_at: datetime | None
     bytes: int | None
+    forgotten: int = 0
+    tombstones: int = 0
 
 
 class EventSink(Protocol):
@@ -271,6 +277,24 @@ class Store(Protocol):
 
     def close_event(self, uid: UUID, end: datetime) -> Closed:
         """End an open event and recompute the extents of all its wholes; the same end again changes nothing."""
+
+    def forget(self, ids: Sequence[int], *, run: UUID, at: datetime) -> Forgotten:
+        """Forget those of these events that have ended, in one transaction, as a piece of the forgetting `run`.
+
+        `at` is when that began. Unknown ids are passed over.
+        """
+
+    def would_forget(self, ids: Sequence[int]) -> Forgotten:
+        """What forgetting these events would do; nothing is changed."""
+
+    def tombstones(self, uids: Sequence[UUID] | None = None) -> Iterator[Tombstone]:
+        """The tombstones of single events, by id; with `uids` those of these."""
+
+    def run_tombstones(self) -> Iterator[RunTombstone]:
+        """What is left of the rest of each forgetting, oldest first."""
+
+    def keep_tombstones(self, given: Sequence[Tombstone | RunTombstone]) -> BatchReport:
+        """Keep tombstones of another memory; of an event that this one has, nothing is kept."""
 
     def find(self, query: Query) -> Iterator[StoredEvent]:
         """The events a query asks for, streamed from one consistent view."""

@@ -36,6 +36,9 @@ def subscribe(
     With a `name` the place is kept in the memory after each page that was handed over completely, and the
     next subscription of that name goes on from there; `since` is where a new one begins. After a crash the
     last page comes again. Two subscriptions of one name at once are refused with `ConsumerBusy`.
+
+    Events that were forgotten before they were handed over are passed over; the report of the named consumer
+    counts them as `forgotten`.
     """
     if timeout is not None and (isinstance(timeout, bool) or not isinstance(timeout, int | float) or not timeout >= 0):
         raise InvalidValue(f"the timeout of a subscription is a number of seconds, or None for no end, not {timeout!r}")
@@ -57,8 +60,10 @@ def _events(
     log = store.log
     try:
         with nullcontext() if name is None else log.exclusive(name):
+            forgotten = 0
             if name is not None:
-                position = log.register(name, position=position).position
+                known = log.register(name, position=position)
+                position, forgotten = known.position, known.report.get("forgotten", 0)
             quiet_since = time.monotonic()
             while True:
                 if log.head() > position:
@@ -68,7 +73,9 @@ def _events(
                         yield event
                         quiet_since = time.monotonic()
                     if name is not None:
-                        log.advance([Step(name=name, before=before, position=position)])
+                        forgotten += sum(entry.is_forgotten for entry in page)
+                        report = {"forgotten": forgotten} if forgotten else {}
+                        log.advance([Step(name=name, before=before, position=position, report=report)])
                 else:
                     left = _PATIENCE if timeout is None else quiet_since + timeout - time.monotonic()
                     if left <= 0:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from uuid import UUID
 
 from elm.event import Event
 from elm.interval import as_utc
-from elm.store import Arrival, Closed, Committed, Store
+from elm.store import Arrival, BatchReport, Closed, Committed, Store
+from elm.tombstone import RunTombstone, Tombstone
 
 LOAD_BATCH = 5_000
 """Events of a load that are kept in one transaction."""
@@ -51,6 +52,13 @@ class Writer:
         The same end again changes nothing; another end is refused.
         """
         return self._store.close_event(uid, as_utc(end, what="the end of an event"))
+
+    def keep_tombstones(self, given: Sequence[Tombstone | RunTombstone]) -> BatchReport:
+        """Keep tombstones of another memory, before the events that have them as parts.
+
+        An event that this memory has stays, and its tombstone is not kept: it counts as existing.
+        """
+        return self._store.keep_tombstones(given)
 
     def load(
         self,

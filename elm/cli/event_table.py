@@ -17,6 +17,7 @@ from elm.event import Payload, StoredEvent
 if TYPE_CHECKING:
     from elm.features import Feature
     from elm.geometry import Region
+    from elm.tombstone import Tombstone
 
 _PREVIEW = 400
 """Characters of a text payload that a card shows."""
@@ -90,6 +91,12 @@ def event_line(event: StoredEvent, remark: str = "") -> Text:
     shown = [str(event.id), event.type, moment(event.interval.begin), lasting(event.interval.duration)]
     shown += map(feature, event.features)
     return cell("  ".join([*shown, remark] if remark else shown))
+
+
+def tombstone_line(tombstone: Tombstone) -> Text:
+    """A forgotten event in one line."""
+    interval = tombstone.interval
+    return cell("  ".join([str(tombstone.uid), "forgotten", moment(interval.begin), lasting(interval.duration)]))
 
 
 def cell(text: str) -> Text:

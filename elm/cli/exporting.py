@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, BinaryIO
+from typing import TYPE_CHECKING, Annotated, BinaryIO, Generic, TypeVar
 
 import typer
 
@@ -17,7 +17,7 @@ from elm.cli.option_groups import takes_groups
 from elm.cli.terminal import progress, say
 
 if TYPE_CHECKING:
-    from elm.event import StoredEvent
+    from elm.exporting import Exported
     from elm.recollector import Recollection
 
 
@@ -50,35 +50,52 @@ def export(
         found = memory.recall(cue, order="id")
         total = found.count()
         with progress("exporting", total=total) as done, _opened(to) as sink:
-            written = _write(found, output, sink, done)
+            written, tombstones = _write(found, output, sink, done)
     added = f", {written - total:,} of them parts of what matched" if written > total else ""
-    say(f"{written:,} events exported{added}")
+    forgotten = f", and {tombstones:,} tombstones" if tombstones else ""
+    say(f"{written:,} events exported{added}{forgotten}")
 
 
-def _write(found: Recollection, form: ExportFormat, sink: BinaryIO, done: Callable[[int], None]) -> int:
+def _write(found: Recollection, form: ExportFormat, sink: BinaryIO, done: Callable[[int], None]) -> tuple[int, int]:
+    """Write what was found; how many events and tombstones that were."""
     from elm import exporting
 
-    if form is ExportFormat.PARQUET:
-        return exporting.write_parquet(found, sink, progress=done)
-    counted = _Watched(exporting.with_parts(found) if form is ExportFormat.JSONL else found, done)
-    for chunk in exporting.jsonl(counted) if form is ExportFormat.JSONL else exporting.geojson(counted):
-        sink.write(chunk)
-    return counted.count
+    match form:
+        case ExportFormat.PARQUET:
+            return exporting.write_parquet(found, sink, progress=done), 0
+        case ExportFormat.JSONL:
+            lines = _Watched(exporting.with_parts(found), done)
+            for chunk in exporting.jsonl(lines):
+                sink.write(chunk)
+            return lines.count, lines.tombstones
+        case ExportFormat.GEOJSON:
+            events = _Watched(found, done)
+            for chunk in exporting.geojson(events):
+                sink.write(chunk)
+            return events.count, 0
 
 
-class _Watched:
-    """Events on their way to a file, counted for the bar."""
+_Exported = TypeVar("_Exported", bound="Exported")
 
-    def __init__(self, events: Iterable[StoredEvent], done: Callable[[int], None]) -> None:
+
+class _Watched(Generic[_Exported]):
+    """Events, and tombstones, on their way to a file, counted for the bar."""
+
+    def __init__(self, events: Iterable[_Exported], done: Callable[[int], None]) -> None:
         self._events = events
         self._done = done
-        self.count = 0
+        self.count = self.tombstones = 0
 
-    def __iter__(self) -> Iterator[StoredEvent]:
+    def __iter__(self) -> Iterator[_Exported]:
+        from elm.event import StoredEvent
+
         for event in self._events:
-            self.count += 1
-            if self.count % 1_000 == 0:
-                self._done(self.count)
+            if not isinstance(event, StoredEvent):
+                self.tombstones += 1
+            else:
+                self.count += 1
+                if self.count % 1_000 == 0:
+                    self._done(self.count)
             yield event
 
 

@@ -56,6 +56,8 @@ def load(
 
 def _report(report: FileReport, refused_file: Path) -> None:
     told = [f"{report.new:,} events loaded"]
+    if report.tombstones:
+        told.append(f"{report.tombstones:,} tombstones kept")
     if report.existing:
         told.append(f"{report.existing:,} were there already")
     if report.refused:

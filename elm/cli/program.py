@@ -10,6 +10,7 @@ from elm.cli.cluster_commands import down, status, up
 from elm.cli.counting import count, stats
 from elm.cli.demonstration import demo
 from elm.cli.exporting import export
+from elm.cli.forgetting import forget
 from elm.cli.loading import load
 from elm.cli.maintenance import doctor, migrate
 from elm.cli.recalling import recall
@@ -27,7 +28,7 @@ app = typer.Typer(
 )
 
 _PANELS = {
-    "Memory": (load, recall, count, show, tree, stats, export, demo),
+    "Memory": (load, recall, count, show, tree, stats, export, forget, demo),
     "Database": (up, down, status, migrate, doctor),
 }
 for _panel, _commands in _PANELS.items():

@@ -123,6 +123,10 @@ def replay(
         say(", ".join(f"{count:,} {name}" for name, count in counts.items()))
     else:
         write_rows(tuple(counts), [tuple(counts.values())], form, right=tuple(counts))
+    if done.forgotten is not None:
+        before = f"the replay ended before position {done.forgotten:,} of the log, whose event was forgotten"
+        say(f"elm: {before}: what follows from it cannot be known, nor what is missing")
+        raise typer.Exit(ExitCode.ERROR)
 
 
 def _write_difference(done: Replay, form: RowFormat) -> None:
@@ -132,7 +136,7 @@ def _write_difference(done: Replay, form: RowFormat) -> None:
 
 _STATUS = (
     *("consumer", "recognizer", "version", "position", "lag", "fed", "found", "partial", "late", "dropped"),
-    *("split", "passed_over", "cut", "events_per_second", "slowest", "failures", "is_failing", "error"),
+    *("split", "passed_over", "cut", "forgotten", "events_per_second", "slowest", "failures", "is_failing", "error"),
 )
 
 
@@ -146,11 +150,11 @@ def _write_status(found: Sequence[RecognizerStatus], form: RowFormat) -> None:
 
 def _print_status(found: Sequence[RecognizerStatus]) -> None:
     """The numbers as a table, and below it in full why recognizers failed."""
-    names = (*_STATUS[:13], "events/s", "slowest", "failures", "failing")
+    names = (*_STATUS[:14], "events/s", "slowest", "failures", "failing")
     rows = [
         (
             *(each.consumer, each.name, each.version, each.position, each.lag, each.fed, each.found, each.partial),
-            *(each.late, each.dropped, each.split, each.passed_over, each.cut),
+            *(each.late, each.dropped, each.split, each.passed_over, each.cut, each.forgotten),
             None if each.events_per_second is None else round(each.events_per_second),
             f"{1000 * each.slowest:,.1f} ms",
             each.failures,
@@ -158,7 +162,7 @@ def _print_status(found: Sequence[RecognizerStatus]) -> None:
         )
         for each in found
     ]
-    write_rows(names, rows, RowFormat.TABLE, right=names[2:16])
+    write_rows(names, rows, RowFormat.TABLE, right=names[2:17])
     for each in found:
         if each.error is not None:
             answers().print(visible(f"{each.name} failed {each.failures:,} times, the last time with: {each.error}"))

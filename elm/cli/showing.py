@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Annotated
 from uuid import UUID
 
@@ -21,13 +21,14 @@ from elm.cli.exits import ExitCode
 from elm.cli.memory_options import MemoryOptions
 from elm.cli.naming import event_name
 from elm.cli.option_groups import takes_groups
-from elm.cli.terminal import answers, say
+from elm.cli.terminal import answers, say, write
 
 if TYPE_CHECKING:
     from rich.tree import Tree
 
     from elm.app import Memory
     from elm.event import StoredEvent
+    from elm.tombstone import Tombstone
 
 _CHUNK = 1_000
 
@@ -77,16 +78,22 @@ def tree(
 ) -> None:
     """Show what an event is made of: its parts, their parts, and so on.
 
-    As JSON Lines each event comes once, parts before wholes, so that the lines can be loaded.
+    As JSON Lines each event comes once, parts before wholes and tombstones of forgotten parts before all, so that the
+    lines can be loaded.
     """
     name = event_name(event)
     with where.open() as memory:
         root = memory.get(name)
         below = _parts_below(memory, [root], depth)
+        shown_in_full = below if depth is None else _parts_below(memory, [root], depth - 1)
+        forgotten = {} if depth == 0 else _forgotten_among(memory, [root, *shown_in_full.values()])
     if record_format(output) is RecordFormat.JSONL:
-        write_events(sorted({root.uid: root, **below}.values(), key=lambda each: each.id), EventFormat.JSONL)
+        from elm.exporting import jsonl
+
+        events = sorted({root.uid: root, **below}.values(), key=lambda each: each.id)
+        write(jsonl([*forgotten.values(), *events]))
     else:
-        answers().print(_drawn(root, below))
+        answers().print(_drawn(root, {**below, **forgotten}))
 
 
 def _write_cards(events: Iterable[StoredEvent]) -> None:
@@ -115,11 +122,18 @@ def _parts_below(memory: Memory, roots: Iterable[StoredEvent], depth: int | None
     return known
 
 
-def _drawn(root: StoredEvent, below: dict[UUID, StoredEvent]) -> Tree:
+def _forgotten_among(memory: Memory, events: Iterable[StoredEvent]) -> dict[UUID, Tombstone]:
+    """The tombstones of parts of these events, by uid."""
+    parts = {uid for each in events for uid in each.parts}
+    return {each.uid: each for each in memory.store.tombstones([*parts])} if parts else {}
+
+
+def _drawn(root: StoredEvent, below: Mapping[UUID, StoredEvent | Tombstone]) -> Tree:
     """The partonomy; an event that is part of several others is drawn in full only where it comes first."""
     from rich.tree import Tree
 
-    from elm.cli.event_table import event_line
+    from elm.cli.event_table import event_line, tombstone_line
+    from elm.event import StoredEvent
 
     drawing = Tree(event_line(root))
     drawn = {root.uid}
@@ -129,6 +143,8 @@ def _drawn(root: StoredEvent, below: dict[UUID, StoredEvent]) -> Tree:
         part = next((below[uid] for uid in parts if uid in below), None)
         if part is None:
             open_branches.pop()
+        elif not isinstance(part, StoredEvent):
+            branch.add(tombstone_line(part))
         elif part.uid in drawn and part.parts:
             branch.add(event_line(part, "(shown above)"))
         else:

@@ -42,6 +42,8 @@ class Tally:
         self.counts = [Count() for _ in strand.recognizers]
         self.late = 0
         self.passed_over = 0
+        self.forgotten = 0
+        """Entries whose events had been forgotten before they were read."""
         self._longest = 0.0
 
     def took(self, number: int, seconds: float) -> None:
@@ -61,11 +63,13 @@ class Tally:
     def snapshot(self) -> Any:
         """What is told of the whole past, as plain JSON."""
         counts = [[each.fed, each.found, each.cut, each.slowest] for each in self.counts]
-        return [counts, self.late, self.passed_over]
+        return [counts, self.late, self.passed_over, self.forgotten]
 
     def resume(self, told: Any) -> None:
         """Count on from a snapshot."""
-        counts, self.late, self.passed_over = told
+        # Checkpoints of memories that could not forget yet do not tell of it.
+        counts, self.late, self.passed_over, *forgotten = told
+        self.forgotten = sum(forgotten)
         self.counts = [Count(fed=fed, found=found, cut=cut, slowest=slow) for fed, found, cut, slow in counts]
 
 

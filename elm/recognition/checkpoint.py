@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import msgspec
 
@@ -23,12 +24,38 @@ def taken(fold: Fold, strand: str) -> bytes:
     return msgspec.json.encode({"state": state, "events": stored, "results": results})
 
 
-def restored(fold: Fold, strand: str, checkpoint: bytes, get: Callable[[Sequence[int]], Sequence[StoredEvent]]) -> None:
-    """Have the one strand of a fold as it was when `checkpoint` was taken; `get` gives events by id."""
+def held_events(checkpoint: bytes) -> list[int]:
+    """The ids of the events of the memory that a checkpoint refers to."""
+    held: list[int] = msgspec.json.decode(checkpoint)["events"]
+    return held
+
+
+def restored(fold: Fold, strand: str, checkpoint: bytes, get: Callable[[Sequence[int]], Sequence[StoredEvent]]) -> int:
+    """Have the one strand of a fold as it was when `checkpoint` was taken; `get` gives events by id.
+
+    Returns how many of the events that it refers to were forgotten since: these no longer wait, and what was
+    unfinished for an agent one of whose events is among them begins anew.
+    """
     told = msgspec.json.decode(checkpoint)
     named = {str(event.uid): event for event in get(told["events"])}
+    forgotten = len(told["events"]) - len(named)
     named |= {given["uid"]: _result(given) for given in told["results"]}
-    fold.resume(strand, told["state"], named)
+    fold.resume(strand, _without_forgotten(told["state"], named) if forgotten else told["state"], named)
+    return forgotten
+
+
+def _without_forgotten(state: Mapping[str, Any], named: Mapping[str, StoredEvent]) -> dict[str, Any]:
+    def known(waiting: Sequence[tuple[str, int]]) -> list[tuple[str, int]]:
+        return [(uid, moment) for uid, moment in waiting if uid in named]
+
+    states, held = state["across"]
+    return {
+        **state,
+        "queues": [(agent, known(waiting)) for agent, waiting in state["queues"]],
+        "shared": known(state["shared"]),
+        "benches": [each for each in state["benches"] if len(known(each[2])) == len(each[2])],
+        "across": (states, held) if len(known(held)) == len(held) else ({}, []),
+    }
 
 
 def _result(given: dict[str, object]) -> StoredEvent:

@@ -85,6 +85,8 @@ class Fold:
         event = entry.event
         if event is None or entry.kind not in (LogKind.COMMIT, LogKind.CLOSE):
             self.clocks.tell(entry, None)
+            if entry.is_forgotten:
+                _count_forgotten(self.works.values())
             return
         end = moment_of(event)
         before, shared = self.clocks.watermark(entry.agent), self.clocks.shared
@@ -312,6 +314,11 @@ class Fold:
 def _count_late(works: Iterable[Work]) -> None:
     for work in works:
         work.tally.late += 1
+
+
+def _count_forgotten(works: Iterable[Work]) -> None:
+    for work in works:
+        work.tally.forgotten += 1
 
 
 def _count_passed_over(works: Iterable[Work]) -> None:

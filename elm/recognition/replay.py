@@ -14,6 +14,7 @@ from elm.recognition.clocks import Timing
 from elm.recognition.enrolment import known_strands, refuse_changed
 from elm.recognition.fold import Fold, Taken
 from elm.recognition.judging import TypeJudge
+from elm.recognition.keeping import keep_results
 from elm.recognition.manager import BATCH
 from elm.recognition.work import Work
 from elm.recognizers.base import DEADLINE, RECOGNIZER, VERSION, Recognizer
@@ -26,6 +27,9 @@ class Replay:
 
     `missing` are results of these recognizers that the memory has and the replay lacks: found live where late
     events were not known, or by what came before the position it began at. `late` events were not fed.
+
+    `forgotten` is the position of the first entry whose event has been forgotten, None where there is none: the
+    replay ends before it. What it found is that of the log up to there, and what it lacks cannot be told.
     """
 
     entries: int
@@ -33,6 +37,7 @@ class Replay:
     new: tuple[UUID, ...]
     missing: tuple[UUID, ...]
     late: int
+    forgotten: int | None = None
 
 
 def replay(
@@ -49,6 +54,8 @@ def replay(
     From the beginning, results equal those of a live run with the same `timing`; from a later position they do
     where nothing was unfinished there. A `complete` replay feeds what came too late as well, and holds all events
     that the recognizers want in this process. With `commit=False` nothing is written but the types of the results.
+
+    Where an event of the log was forgotten the replay ends: what follows from it cannot be known.
     """
     timing = timing or Timing()
     judge = TypeJudge(store.types)
@@ -62,19 +69,22 @@ def replay(
         raise InvalidValue(f"a replay begins behind a position of the log, 0 to {head:,}, not {since!r}")
     found: list[UUID] = []
     new: list[UUID] = []
-    while position < head:
+    forgotten: int | None = None
+    while position < head and forgotten is None:
         entries = store.log.read(position, min(BATCH, head - position))
-        position = entries[-1].position
-        _keep(store, fold.take(entries), found, new, commit=commit)
+        forgotten = next((entry.position for entry in entries if entry.is_forgotten), None)
+        position = entries[-1].position if forgotten is None else forgotten - 1
+        _keep(store, fold.take(entry for entry in entries if entry.position <= position), found, new, commit=commit)
     _keep(store, fold.finish(), found, new, commit=commit)
     known = set(found)
-    missing = [uid for uid in _live(store, recognizers) if uid not in known]
+    missing = [uid for uid in _live(store, recognizers) if uid not in known] if forgotten is None else []
     return Replay(
-        entries=max(0, head - since),
+        entries=position - since,
         found=tuple(found),
         new=tuple(new),
         missing=tuple(missing),
         late=sum(work.tally.late for work in works),
+        forgotten=forgotten,
     )
 
 
@@ -87,7 +97,8 @@ def _keep(store: LoggedStore, taken: Taken, found: list[UUID], new: list[UUID], 
         new += [each.uid for each in wholes if not store.exists(UidCue(uids=(each.uid,)))]
         return
     events: list[Event] = [event for _, result in taken.results for event in result.events]
-    fresh = {each.uid for each in store.commit_all([Arrival(event=event) for event in events]) if each.new}
+    kept = keep_results(store, [Arrival(event=event) for event in events], store.commit_all)
+    fresh = {each.uid for each in kept if each.new}
     new += [each.uid for each in wholes if each.uid in fresh]
 
 

@@ -8,12 +8,14 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from functools import partial
 from threading import Event as Signal
 
 from elm.errors import (
     ConflictingContent,
     CycleRefused,
     ExtentRefused,
+    ForgottenEvent,
     InvalidValue,
     PositionLost,
     UnknownEvent,
@@ -26,6 +28,7 @@ from elm.recognition.bench import RecognizerFailure
 from elm.recognition.clocks import Clocks, Timing
 from elm.recognition.fold import Fold, Taken
 from elm.recognition.judging import TypeJudge
+from elm.recognition.keeping import keep_results
 from elm.recognition.results import Result
 from elm.recognition.status import Failures, report_of, report_of_failure
 from elm.recognition.strands import Strand
@@ -45,7 +48,15 @@ ERROR_SHOWN = 1_000
 LARGE = 256 * 1024
 """Bytes from which a checkpoint is not taken with every batch but with every `LARGE_EVERY`-th."""
 LARGE_EVERY = 16
-_REFUSALS = (ConflictingContent, CycleRefused, ExtentRefused, InvalidValue, UnknownEvent, UnknownType)
+_REFUSALS = (
+    ConflictingContent,
+    CycleRefused,
+    ExtentRefused,
+    ForgottenEvent,
+    InvalidValue,
+    UnknownEvent,
+    UnknownType,
+)
 """What a memory says of results that cannot be kept."""
 
 log = logging.getLogger(__name__)
@@ -129,10 +140,13 @@ class Shift:
         at = consumer.checkpoint
         if consumer.state is not None:
             try:
-                checkpoint.restored(fold, strand.name, consumer.state, self._store.get)
+                forgotten = checkpoint.restored(fold, strand.name, consumer.state, self._store.get)
             except RecognizerFailure as failure:
                 self._fail(strand, failure)
                 return None
+            if forgotten:
+                told = "recognition %r: %r goes on without what was unfinished with %d events that were forgotten"
+                log.warning(told, self._orders.consumer, strand.name, forgotten)
         while at < consumer.position:
             entries = self._store.log.read(at, min(self._orders.batch, consumer.position - at))
             taken = fold.take(entries)
@@ -202,7 +216,7 @@ class Shift:
         of_these = lane.fold.works.keys()
         arrivals = [Arrival(event=event) for name, result in results if name in of_these for event in result.events]
         try:
-            self._store.log.advance(steps, arrivals)
+            keep_results(self._store, arrivals, partial(self._store.log.advance, steps))
         except _REFUSALS as error:
             self._lanes.remove(lane)
             if len(steps) == 1:

@@ -31,8 +31,8 @@ class RecognizerStatus:
 
     `lag` is how many entries of the log it has not dealt with; `partial` its unfinished matches, `dropped` those
     given up for its bounds, `split` episodes cut in pieces for them; `late` events came too late to be fed to its
-    strand, `passed_over` were too many to be held; `cut` results were left out because it feeds itself; `slowest`
-    is the longest single call, in seconds.
+    strand, `passed_over` were too many to be held, `forgotten` had been forgotten before they were read; `cut`
+    results were left out because it feeds itself; `slowest` is the longest single call, in seconds.
     """
 
     name: str
@@ -48,6 +48,7 @@ class RecognizerStatus:
     late: int = 0
     passed_over: int = 0
     cut: int = 0
+    forgotten: int = 0
     events_per_second: float | None = None
     slowest: float = 0.0
     is_failing: bool = False
@@ -85,6 +86,7 @@ def report_of(work: Work, consumer: str, clocks: Clocks, failures: Failures | No
         "recognizers": recognizers,
         "late": tally.late,
         "passed_over": tally.passed_over,
+        "forgotten": tally.forgotten,
         "watermarks": watermarks,
         "is_failing": False,
     }
@@ -136,6 +138,7 @@ def _status(consumer: Consumer, told: Mapping[str, Any], head: int) -> Recognize
         late=report.get("late", 0),
         passed_over=report.get("passed_over", 0),
         cut=told.get("cut", 0),
+        forgotten=report.get("forgotten", 0),
         events_per_second=round(fed_here / seconds, 1) if seconds else None,
         slowest=told.get("slowest", 0.0),
         is_failing=report.get("is_failing", False),

@@ -12,10 +12,12 @@ from elm.event import content_hash
 from elm.storage import staging
 from elm.storage import write_statements as sql
 from elm.storage.batch import Batch, parts_to_come
-from elm.storage.connections import Connection
+from elm.storage.connections import Connection, TransactionUndone
 from elm.storage.event_writing import Stored, refuse_other, why_refused
 from elm.storage.staging import Written
+from elm.storage.tombstone_rows import forgotten_among
 from elm.store import BatchReport, Refusal
+from elm.tombstone import still_counts
 
 _ATTEMPTS = 10
 """How often a batch is begun anew because another process was committing one of its events."""
@@ -49,7 +51,10 @@ def _load(connection: Connection, batch: Batch, stored: Stored) -> BatchReport:
     for index, number in complex_ones.items():
         if number not in taken:
             event = batch.arrivals[index].event
-            refused[index] = str(why_refused(event, stored(event.parts)))
+            reason = why_refused(connection, event, stored(event.parts))
+            if isinstance(reason, TransactionUndone):
+                raise reason
+            refused[index] = str(reason)
     lost = {batch.arrivals[index].event.uid for index in batch.rest if index in refused}
     doubles = {index for index in batch.repeats if batch.arrivals[index].event.uid in lost}
     refused |= dict.fromkeys(doubles, "the same event was refused earlier in this batch")
@@ -62,18 +67,23 @@ def _fresh(connection: Connection, batch: Batch, stored: Stored, refused: dict[i
     """The rows that are to be written: not in the memory yet, nor of other content, nor before their parts."""
     arrivals = batch.arrivals
     uids = [arrivals[index].event.uid for index in batch.rest]
-    known = {UUID(bytes=uid): content for uid, content in connection.execute(sql.CONTENTS, [uids], binary=True)}
+    known = {UUID(bytes=uid): content for uid, content in connection.execute(sql.CONTENTS, {"uids": uids}, binary=True)}
     present = [index for index in batch.rest if arrivals[index].event.uid in known]
     for index in present:
         event = arrivals[index].event
-        if known[event.uid] != content_hash(event):
+        if known[event.uid] is None:
+            refused[index] = still_counts(event.uid)
+        elif known[event.uid] != content_hash(event):
             try:
                 refuse_other(event, next(iter(stored([event.uid]))))
             except ConflictingContent as error:
                 refused[index] = str(error)
     rest = set(batch.rest)
     later = {index: parts for index, parts in parts_to_come(arrivals).items() if index in rest}
-    here = {each.uid for each in stored([uid for parts in later.values() for uid in parts])}
+    asked = [uid for parts in later.values() for uid in parts]
+    here = {each.uid for each in stored(asked)}
+    if asked:
+        here |= forgotten_among(connection, asked)
     for index, parts in later.items():
         if arrivals[index].event.uid not in known and (missing := parts - here):
             named = ", ".join(sorted(map(str, missing))[:5])
@@ -96,9 +106,10 @@ def _insert_complex(
     """Write complex events, some of whose parts stand `outside` of the batch."""
     rows = ((number, batch.heights[index], batch.encode(batch.arrivals[index])) for index, number in ids.items())
     staging.stage(connection, rows)
-    connection.execute(sql.LOCK_OPEN_PARTS, [outside])
+    over_tombstones = staging.lock_parts(connection, outside)
+    statement = sql.LOAD_LEVEL_OVER_TOMBSTONES if over_tombstones else sql.LOAD_LEVEL
     written: list[Written] = []
     for level in sorted({batch.heights[index] for index in ids}):
-        found = connection.execute(sql.LOAD_LEVEL, {"level": level}, binary=True)
+        found = connection.execute(statement, {"level": level}, binary=True)
         written += [Written(number, is_open, agent) for number, _, _, is_open, agent in found]
     return written

@@ -6,7 +6,21 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, assert_never
 
-from sqlalchemy import FromClause, Integer, LargeBinary, Text, and_, any_, bindparam, false, func, or_, select, true
+from sqlalchemy import (
+    FromClause,
+    Integer,
+    LargeBinary,
+    Select,
+    Text,
+    and_,
+    any_,
+    bindparam,
+    false,
+    func,
+    or_,
+    select,
+    true,
+)
 
 from elm.cues.algebra import (
     AgentCue,
@@ -45,6 +59,10 @@ class CompiledCue:
     search: Callable[[FromClause], Condition] | None
     """What an index finds: all that match and, unless `is_search`, others; None where no index serves."""
     is_search: bool
+    glimpse: Callable[[FromClause], Condition] | None
+    """Something cheap that all fulfil that match, to be asked first of rows that no index chose."""
+    narrow: Callable[[FromClause], Condition] | None
+    """What all fulfil that match, as an index understands it that knows begins too; None without one."""
 
 
 def compile_cue(cue: Cue, names: Names, *, prefix: str = "p") -> CompiledCue:
@@ -58,8 +76,18 @@ def compile_cue(cue: Cue, names: Names, *, prefix: str = "p") -> CompiledCue:
 
         return condition
 
-    search = None if rule.search is None else bound(rule.search)
-    return CompiledCue(rule.key, values, bound(rule.build), search, rule.is_search)
+    def bound_if_any(build: Callable[..., Condition] | None) -> Callable[[FromClause], Condition] | None:
+        return None if build is None else bound(build)
+
+    return CompiledCue(
+        key=rule.key,
+        values=values,
+        condition=bound(rule.build),
+        search=bound_if_any(rule.search),
+        is_search=rule.is_search,
+        glimpse=bound_if_any(rule.glimpse),
+        narrow=bound_if_any(rule.narrow),
+    )
 
 
 def _rule(cue: Cue, names: Names) -> Rule:
@@ -113,17 +141,24 @@ def _combined(op: str, args: Sequence[Cue], names: Names) -> Rule:
         built = [build(e, *own) for build, own in zip(builds, taken, strict=True) if build is not None]
         return and_(true(), *built) if op == "and" else or_(false(), *built)
 
+    def combined(parts: Sequence[Callable[..., Condition] | None]) -> Callable[..., Condition] | None:
+        """What is made of those that have this: of some of those that hold together, or of all alternatives."""
+        has = [part is not None for part in parts]
+        if not (any(has) if op == "and" else has and all(has)):
+            return None
+        return lambda e, *binds: joined(e, binds, parts)
+
     def build(e: FromClause, *binds: Bind) -> Condition:
         return joined(e, binds, [rule.build for rule in rules])
 
-    def search(e: FromClause, *binds: Bind) -> Condition:
-        return joined(e, binds, [rule.search for rule in rules])
-
-    key = (op, *(rule.key for rule in rules))
-    if rules and all(rule.is_search for rule in rules):
-        return indexed(key, values, build)
-    served = [rule.search is not None for rule in rules]
-    return Rule(key, values, build, search if (any(served) if op == "and" else rules and all(served)) else None)
+    return Rule(
+        key=(op, *(rule.key for rule in rules)),
+        values=values,
+        build=build,
+        search=build if rules and all(rule.is_search for rule in rules) else combined([rule.search for rule in rules]),
+        glimpse=combined([rule.glimpse for rule in rules]),
+        narrow=combined([rule.narrow for rule in rules]),
+    )
 
 
 def _take(binds: Iterator[Bind], count: int) -> list[Bind]:
@@ -131,18 +166,29 @@ def _take(binds: Iterator[Bind], count: int) -> list[Bind]:
 
 
 def _type(cue: TypeCue, names: Names) -> Rule:
-    number = (names.type_id(cue.type), Integer())
+    values = ((names.type_id(cue.type), Integer()),)
     match cue.relation:
         case TypeRelation.EXACTLY:
-            return indexed(("type", "exactly"), (number,), lambda e, p: e.c.type_id == p)
+
+            def exactly(e: FromClause, p: Bind) -> Condition:
+                return e.c.type_id == p
+
+            return Rule(("type", "exactly"), values, exactly, exactly, narrow=exactly)
         case TypeRelation.IS_A:
-            # IN (SELECT ...), not = ANY(ARRAY(SELECT ...)): the latter took 170 ms where this takes 2.
-            return indexed(
-                ("type", "is_a"),
-                (number,),
-                lambda e, p: e.c.type_id.in_(
-                    select(type_closure.c.descendant_id).where(type_closure.c.ancestor_id == p)
-                ),
-            )
+
+            def is_a(e: FromClause, p: Bind) -> Condition:
+                # IN (SELECT ...), not = ANY(ARRAY(SELECT ...)): the latter took 170 ms where this takes 2.
+                return e.c.type_id.in_(_below(p))
+
+            def narrow(e: FromClause, p: Bind) -> Condition:
+                # But between two begins this is one probe for each type, where that is a join with all in between.
+                return e.c.type_id == any_(func.array(_below(p).scalar_subquery()))
+
+            return Rule(("type", "is_a"), values, is_a, is_a, narrow=narrow)
         case unknown:
             assert_never(unknown)
+
+
+def _below(ancestor: Bind) -> Select[Any]:
+    """The types that are the given one or below it."""
+    return select(type_closure.c.descendant_id).where(type_closure.c.ancestor_id == ancestor)

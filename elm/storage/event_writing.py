@@ -7,13 +7,15 @@ from datetime import UTC, datetime
 from heapq import heapify, heappop, heappush
 from uuid import UUID
 
-from elm.errors import ConflictingContent, ExtentRefused, InvalidValue, UnknownEvent
+from elm.errors import ConflictingContent, ExtentRefused, ForgottenEvent, InvalidValue, UnknownEvent
 from elm.event import Event, StoredEvent, content_hash
 from elm.storage import encoding, prepared
 from elm.storage import write_statements as sql
 from elm.storage.connections import Connection, TransactionUndone
 from elm.storage.names import NameCache
+from elm.storage.tombstone_rows import forgotten_among
 from elm.store import Arrival, Closed, Committed
+from elm.tombstone import still_counts
 
 Stored = Callable[[Sequence[UUID]], Iterable[StoredEvent]]
 """Gives the events of some uids, as the writing transaction sees them."""
@@ -39,7 +41,10 @@ def encoder(events: Sequence[Event], names: NameCache, now: datetime) -> Callabl
 def commit(connection: Connection, event: Event, row: encoding.Row, now: datetime) -> Committed | None:
     """Write one event; None when it was not taken."""
     name, statement = ("elm_complex", sql.COMMIT_COMPLEX) if event.parts else ("elm_atomic", sql.COMMIT_ATOMIC)
-    found = prepared.run(connection, name, statement, (*row, encoding.timestamp(now)))
+    values = (*row, encoding.timestamp(now))
+    found = prepared.run(connection, name, statement, values)
+    if not found and event.parts and forgotten_among(connection, event.parts):
+        found = prepared.run(connection, "elm_complex_forgotten", sql.COMMIT_OVER_TOMBSTONES, values)
     if not found:
         return None
     (number, existed), *_ = found
@@ -47,18 +52,21 @@ def commit(connection: Connection, event: Event, row: encoding.Row, now: datetim
     return Committed(id=int.from_bytes(number), uid=event.uid, new=existed == b"\0")
 
 
-def same_or_refused(event: Event, stored: Stored) -> Committed:
+def same_or_refused(connection: Connection, event: Event, stored: Stored) -> Committed:
     """An event that was not taken is the one already stored, as it stands now, or refused."""
     known = {each.uid: each for each in stored([event.uid, *event.parts])}
     if event.uid not in known:
-        raise why_refused(event, known.values())
+        raise why_refused(connection, event, known.values())
     refuse_other(event, known[event.uid])
     return Committed(id=known[event.uid].id, uid=event.uid, new=False)
 
 
-def why_refused(event: Event, parts: Iterable[StoredEvent]) -> Exception:
+def why_refused(connection: Connection, event: Event, parts: Iterable[StoredEvent]) -> Exception:
     """The reason for which the database did not take a new event, whose stored parts are `parts`."""
-    known = {part.uid for part in parts}
+    forgotten = forgotten_among(connection, [event.uid, *event.parts])
+    if event.uid in forgotten:
+        return ForgottenEvent(still_counts(event.uid))
+    known = {part.uid for part in parts} | forgotten
     if missing := [str(uid) for uid in event.parts if uid not in known]:
         return UnknownEvent(
             f"event {event.uid} has parts that are not in the memory: {', '.join(missing[:5])}"
@@ -110,8 +118,10 @@ def close(connection: Connection, uid: UUID, end: datetime) -> Closed | None:
     return Closed(new=True, wholes=tuple(closed))
 
 
-def why_not_closed(uid: UUID, end: datetime, stored: StoredEvent | None) -> Closed:
+def why_not_closed(connection: Connection, uid: UUID, end: datetime, stored: StoredEvent | None) -> Closed:
     """Nothing to do for an event that ended just then; otherwise the reason why it cannot be ended."""
+    if stored is None and forgotten_among(connection, [uid]):
+        raise ForgottenEvent(f"event {uid} had ended when it was forgotten: it cannot be closed")
     if stored is None:
         raise UnknownEvent(f"there is no event {uid} to close: commit it first")
     if stored.parts:

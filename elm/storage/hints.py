@@ -2,7 +2,19 @@
 
 from __future__ import annotations
 
-from elm.cues.algebra import And, Cue, DurationCue, KinCue, PayloadCue, SetRelation, TimeAxis, TimeCue, UidCue
+from elm.cues.algebra import (
+    And,
+    Cue,
+    DurationCue,
+    KinCue,
+    PayloadCue,
+    SetRelation,
+    TimeAxis,
+    TimeCue,
+    TypeCue,
+    TypeRelation,
+    UidCue,
+)
 from elm.interval import AllenRelation, Window
 
 
@@ -22,6 +34,11 @@ def is_pinned(cue: Cue) -> bool:
 def is_guess(cue: Cue) -> bool:
     """Whether the planner takes a third of what else matches for the answer, having nothing to tell it by."""
     return any(map(is_guess, cue.args)) if isinstance(cue, And) else isinstance(cue, DurationCue)
+
+
+def is_in_order(cue: Cue) -> bool:
+    """Whether one index has exactly what matches, in order of begin: its first rows are the answer's."""
+    return isinstance(cue, TypeCue) and cue.relation is TypeRelation.EXACTLY
 
 
 def begins_within(cue: Cue) -> Window:

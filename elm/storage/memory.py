@@ -19,6 +19,7 @@ from elm.exchange import to_line
 from elm.interval import as_utc
 from elm.storage.memory_answers import grouped, nearest_first, neighbours
 from elm.storage.memory_changes import Changes
+from elm.storage.memory_forgetting import Forgetting
 from elm.storage.memory_index import EventIndex, View, conjuncts
 from elm.storage.memory_log import MemoryLog
 from elm.store import (
@@ -38,6 +39,7 @@ from elm.store import (
     TypesAdded,
 )
 from elm.taxonomy import EventType, Taxonomy
+from elm.tombstone import Forgotten, RunTombstone, Tombstone
 
 
 class MemoryStore:
@@ -55,6 +57,7 @@ class MemoryStore:
         self._is_a_links: set[tuple[str, str]] = set()
         self._index = EventIndex()
         self._changes = Changes(self._index, self._taxonomy)
+        self._forgetting = Forgetting(self._index, self._changes.contents)
         self.log = MemoryLog(self._changes, self._index, self._locked, self._changed)
 
     @contextmanager
@@ -119,6 +122,35 @@ class MemoryStore:
         end = as_utc(end, what="the end of an event")
         with self._writing():
             return self._changes.close(uid, end)
+
+    # Forgetting
+
+    def forget(self, ids: Sequence[int], *, run: UUID, at: datetime) -> Forgotten:
+        """Forget those of these events that have ended, as a piece of the forgetting `run`."""
+        with self._writing():
+            return self._forgetting.forget(ids, run=run, at=as_utc(at, what="the time of a forgetting"))
+
+    def would_forget(self, ids: Sequence[int]) -> Forgotten:
+        """What forgetting these events would do; nothing is changed."""
+        with self._locked():
+            return self._forgetting.would_forget(ids)
+
+    def tombstones(self, uids: Sequence[UUID] | None = None) -> Iterator[Tombstone]:
+        """The tombstones of single events, by id; with `uids` those of these."""
+        with self._locked():
+            known = self._index.tombstones
+            found = known.values() if uids is None else [known[uid] for uid in set(uids) if uid in known]
+            return iter(sorted(found, key=lambda tombstone: tombstone.id))
+
+    def run_tombstones(self) -> Iterator[RunTombstone]:
+        """What is left of the rest of each forgetting, oldest first."""
+        with self._locked():
+            return iter(self._forgetting.runs)
+
+    def keep_tombstones(self, given: Sequence[Tombstone | RunTombstone]) -> BatchReport:
+        """Keep tombstones of another memory; of an event that this one has, nothing is kept."""
+        with self._writing():
+            return self._forgetting.keep(given)
 
     # Reading
 
@@ -186,6 +218,8 @@ class MemoryStore:
         with self._locked():
             events = [*self._index.events.values()]
             types, frames = len(self._taxonomy), len(self._index.frames)
+            tombstones = len(self._index.tombstones)
+            forgotten = tombstones + sum(run.events for run in self._forgetting.runs)
         begins = [event.interval.begin for event in events]
         return Statistics(
             events=len(events),
@@ -199,6 +233,8 @@ class MemoryStore:
             last_begin=max(begins, default=None),
             last_recorded_at=max((event.recorded_at for event in events), default=None),
             bytes=None,
+            forgotten=forgotten,
+            tombstones=tombstones,
         )
 
 

@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 from uuid import UUID
 
 from elm.cues.algebra import Kin
-from elm.errors import ConflictingContent, ElmError, InvalidValue, UnknownEvent
+from elm.errors import ConflictingContent, ElmError, ForgottenEvent, InvalidValue, UnknownEvent
 from elm.event import Event, StoredEvent, content_hash
 from elm.interval import Interval, as_utc
 from elm.log import LogKind, Tick
@@ -17,6 +17,7 @@ from elm.storage.memory_index import EventIndex
 from elm.storage.parts_first import parts_first
 from elm.store import Arrival, BatchReport, Closed, Committed, Refusal
 from elm.taxonomy import Taxonomy
+from elm.tombstone import still_counts
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,7 +38,8 @@ class Changes:
         self.log: list[LogRow] = []
         self._index = index
         self._taxonomy = taxonomy
-        self._contents: dict[UUID, bytes] = {}
+        self.contents: dict[UUID, bytes] = {}
+        """The content hashes of the events, as they were committed."""
 
     def keep(self, arrivals: Sequence[Arrival], contents: Sequence[bytes]) -> list[Committed]:
         """Keep all of the arrivals, whose content hashes are `contents`, or none: all is checked before any is."""
@@ -45,6 +47,8 @@ class Changes:
         for arrival, content in zip(arrivals, contents, strict=True):
             event = arrival.event
             self._taxonomy.check(event.type)
+            if event.uid in self._index.tombstones:
+                raise ForgottenEvent(still_counts(event.uid))
             if event.uid in self._index:
                 self._check_same(event, content)
             elif new.setdefault(event.uid, (arrival, content))[1] != content:
@@ -54,10 +58,9 @@ class Changes:
         staged = self._staged([new[uid][0] for uid in order if uid in new])
         for stored in staged.values():
             self._index.add(stored)
-            self._contents[stored.uid] = new[stored.uid][1]
+            self.contents[stored.uid] = new[stored.uid][1]
             for part in stored.parts:
-                known = self._index[part]
-                self._index.replace(changed(known, wholes=(*known.wholes, stored.uid)))
+                self._index.link(part, stored.uid)
         self._log((LogKind.OPEN if each.interval.is_open else LogKind.COMMIT, each) for each in staged.values())
         return [
             Committed(id=self._index.ids[uid], uid=uid, new=staged.pop(uid, None) is not None)
@@ -67,7 +70,7 @@ class Changes:
     def _check_same(self, event: Event, content: bytes) -> None:
         """An event whose uid is there must be what was committed, or what that has become."""
         stored = self._index[event.uid]
-        if content != self._contents[event.uid] and content != content_hash(stored.as_event()):
+        if content != self.contents[event.uid] and content != content_hash(stored.as_event()):
             raise ConflictingContent(
                 f"uid {event.uid} is taken by another event, of type {stored.type!r}: "
                 f"use a new uid, or commit the same content"
@@ -76,7 +79,7 @@ class Changes:
     def _check_parts(self, new: Mapping[UUID, tuple[Arrival, bytes]]) -> None:
         for arrival, _ in new.values():
             for part in arrival.event.parts:
-                if part not in new and part not in self._index:
+                if part not in new and part not in self._index and part not in self._index.tombstones:
                     raise UnknownEvent(
                         f"event {arrival.event.uid} has the unknown part {part}: commit that event first"
                     )
@@ -84,13 +87,14 @@ class Changes:
     def _staged(self, new: Sequence[Arrival]) -> dict[UUID, StoredEvent]:
         """The new events, of which parts come first, as they will be kept, numbered in their order."""
         now = datetime.now(UTC)
+        first = self._index.ids_given + 1
         staged: dict[UUID, StoredEvent] = {}
         for arrival in new:
             event, recorded_at = arrival.event, arrival.recorded_at
             staged[event.uid] = as_stored(
                 event,
-                [staged[part] if part in staged else self._index[part] for part in event.parts],
-                number=len(self._index) + len(staged) + 1,
+                [staged[part] if part in staged else self._index.part(part) for part in event.parts],
+                number=first + len(staged),
                 recorded_at=now if recorded_at is None else as_utc(recorded_at, what="recorded_at"),
             )
         return staged
@@ -119,6 +123,8 @@ class Changes:
 
     def close(self, uid: UUID, end: datetime) -> Closed:
         """End the open event `uid`; wholes of which it was the last open part end with it."""
+        if uid in self._index.tombstones:
+            raise ForgottenEvent(f"event {uid} had ended when it was forgotten: it cannot be closed")
         if uid not in self._index:
             raise UnknownEvent(f"there is no event {uid} to close: commit it first")
         event = self._index[uid]
@@ -142,7 +148,7 @@ class Changes:
     def _close_whole(self, number: int) -> StoredEvent | None:
         """The open whole `number` as it is once all its parts have ended; None while one has not."""
         whole = self._index.events[number]
-        interval = span(self._index[part].interval for part in whole.parts)
+        interval = span(self._index.part(part).interval for part in whole.parts)
         if interval.is_open:
             return None
         closed = changed(whole, interval=interval)

@@ -10,9 +10,12 @@ from elm.errors import ExtentRefused
 from elm.event import Event, StoredEvent
 from elm.geometry import Region, derived_region, same_extent
 from elm.interval import Interval
+from elm.tombstone import Tombstone
 
 
-def as_stored(event: Event, parts: Sequence[StoredEvent], *, number: int, recorded_at: datetime) -> StoredEvent:
+def as_stored(
+    event: Event, parts: Sequence[StoredEvent | Tombstone], *, number: int, recorded_at: datetime
+) -> StoredEvent:
     """The event as a memory keeps it; `parts` are its stored parts, from which its extents derive."""
     interval, region, subject, agent = event.interval, event.region, event.subject, event.agent
     if parts:

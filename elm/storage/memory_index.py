@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Set
 from dataclasses import dataclass
 from uuid import UUID
@@ -14,8 +15,10 @@ from elm.cues.match import match
 from elm.event import StoredEvent
 from elm.geometry import SpatialRelation
 from elm.interval import to_micros
+from elm.storage.memory_events import changed
 from elm.store import Cursor, Nearest, Order, Query
 from elm.taxonomy import Taxonomy
+from elm.tombstone import Tombstone
 
 Position = tuple[int, int]
 """Begin in microseconds and id: the order of time."""
@@ -43,10 +46,14 @@ def conjuncts(cue: Cue) -> tuple[Cue, ...]:
 
 @dataclass(frozen=True, slots=True)
 class Kinship:
-    """Who is part of whom, among the given events by id; `ids` may know more than those."""
+    """Who is part of whom, among the given events by id, and the wholes of tombstones; `ids` may know more than those.
+
+    A tombstone is a part that has no parts.
+    """
 
     events: Mapping[int, StoredEvent]
     ids: Mapping[UUID, int]
+    forgotten: Mapping[UUID, tuple[UUID, ...]]
 
     def of(self, uid: UUID, kin: Kin, *, transitive: bool) -> Set[UUID]:
         """The direct parts or wholes of an event, or all of Def 4 when transitive."""
@@ -63,6 +70,8 @@ class Kinship:
         return found
 
     def _direct(self, uid: UUID, kin: Kin) -> tuple[UUID, ...]:
+        if uid in self.forgotten:
+            return () if kin is Kin.PARTS else self.forgotten[uid]
         event = self.events[self.ids[uid]]
         return event.parts if kin is Kin.PARTS else event.wholes
 
@@ -94,16 +103,20 @@ class View:
 
 
 class EventIndex:
-    """The events of a memory by id, uid, begin and place. Not locked: its store does that.
+    """The events of a memory by id, uid, begin and place, and its tombstones. Not locked: its store does that.
 
-    Ids are given from 1 without gaps; uids and their ids are only ever added.
+    Ids are given from 1 without gaps; none is given twice.
     """
 
     def __init__(self) -> None:
         self.events: dict[int, StoredEvent] = {}
         self.ids: dict[UUID, int] = {}
+        self.tombstones: dict[UUID, Tombstone] = {}
+        self._wholes_of_tombstones: dict[UUID, tuple[UUID, ...]] = {}
+        self.ids_given = 0
         self._positions = SortedKeyList(key=self._position)
         self._places: dict[tuple[str, Place], Index] = {}
+        self._placed: Counter[tuple[str, Place]] = Counter()
 
     def __contains__(self, uid: object) -> bool:
         return uid in self.ids
@@ -117,10 +130,16 @@ class EventIndex:
     @property
     def frames(self) -> set[str]:
         """The frames that regions and subjects are in."""
-        return {frame for frame, _ in self._places}
+        return {frame for frame, place in self._places if self._placed[frame, place]}
+
+    def next_id(self) -> int:
+        """An id that nothing has had yet."""
+        self.ids_given += 1
+        return self.ids_given
 
     def add(self, event: StoredEvent) -> None:
         """Take in a new event."""
+        self.ids_given = max(self.ids_given, event.id)
         self.events[event.id] = event
         self.ids[event.uid] = event.id
         self._positions.add(event.id)
@@ -129,6 +148,51 @@ class EventIndex:
                 if (region.frame, place) not in self._places:
                     self._places[region.frame, place] = Index()
                 self._places[region.frame, place].insert(event.id, region.polygon.bounds)
+                self._placed[region.frame, place] += 1
+
+    def link(self, part: UUID, whole: UUID) -> None:
+        """Note that a part, or a tombstone, is one of a whole."""
+        if part in self.tombstones:
+            self._wholes_of_tombstones[part] = (*self._wholes_of_tombstones[part], whole)
+        else:
+            known = self[part]
+            self.replace(changed(known, wholes=(*known.wholes, whole)))
+
+    def unlink(self, part: UUID, whole: UUID) -> None:
+        """Note that a part, or a tombstone, is one of a whole no more."""
+        if part in self.tombstones:
+            wholes = self._wholes_of_tombstones[part]
+            self._wholes_of_tombstones[part] = tuple(each for each in wholes if each != whole)
+        else:
+            known = self[part]
+            self.replace(changed(known, wholes=tuple(each for each in known.wholes if each != whole)))
+
+    def remove(self, uid: UUID) -> None:
+        """Let go of an event."""
+        event = self[uid]
+        self._positions.remove(event.id)
+        for place, region in ((Place.REGION, event.region), (Place.SUBJECT, event.subject)):
+            if region is not None:
+                self._places[region.frame, place].delete(event.id, region.polygon.bounds)
+                self._placed[region.frame, place] -= 1
+        del self.events[event.id], self.ids[uid]
+
+    def bury(self, tombstone: Tombstone, wholes: tuple[UUID, ...]) -> None:
+        """Take in the tombstone of an event that is a part of these."""
+        self.tombstones[tombstone.uid] = tombstone
+        self._wholes_of_tombstones[tombstone.uid] = wholes
+
+    def dissolve(self, uid: UUID) -> None:
+        """Let go of a tombstone."""
+        del self.tombstones[uid], self._wholes_of_tombstones[uid]
+
+    def wholes_of_tombstone(self, uid: UUID) -> tuple[UUID, ...]:
+        """The events that have a tombstone as their part."""
+        return self._wholes_of_tombstones[uid]
+
+    def part(self, uid: UUID) -> StoredEvent | Tombstone:
+        """What counts as a part: an event or a tombstone."""
+        return self.tombstones[uid] if uid in self.tombstones else self[uid]
 
     def replace(self, event: StoredEvent) -> None:
         """Put `event` for the one with its id; neither its begin nor its places differ."""
@@ -136,7 +200,7 @@ class EventIndex:
 
     def kin(self, uid: UUID, kin: Kin, *, transitive: bool) -> Set[UUID]:
         """The direct parts or wholes of an event, or all of Def 4 when transitive."""
-        return Kinship(self.events, self.ids).of(uid, kin, transitive=transitive)
+        return Kinship(self.events, self.ids, self._wholes_of_tombstones).of(uid, kin, transitive=transitive)
 
     def view(self, query: Query, taxonomy: Taxonomy) -> View:
         """The candidates for `query` in its order (by id for the nearest); unknown types in its cue are refused."""
@@ -148,8 +212,12 @@ class EventIndex:
             cue=query.cue,
             candidates=[self.events[number] for number in self._ordered(self._narrowed(query.cue), order, query.after)],
             descendants=descendants,
-            kinship=Kinship(self.events.copy() if asks_for_kin else {}, self.ids),
+            kinship=self._kinship() if asks_for_kin else Kinship({}, {}, {}),
         )
+
+    def _kinship(self) -> Kinship:
+        """Who is part of whom, as it is now."""
+        return Kinship(self.events.copy(), self.ids.copy(), self._wholes_of_tombstones.copy())
 
     def _position(self, number: int) -> Position:
         return to_micros(self.events[number].interval.begin), number
@@ -193,12 +261,12 @@ class EventIndex:
         """The relatives, seen from the uids of the cue, of which a match must be one."""
         if cue.relation in (SetRelation.SUBSET, SetRelation.DISJOINT):
             return None
-        if cue.relation is not SetRelation.INTERSECTS and not all(uid in self.ids for uid in cue.uids):
+        known = [uid for uid in cue.uids if uid in self.ids or uid in self.tombstones]
+        if cue.relation is not SetRelation.INTERSECTS and len(known) < len(cue.uids):
             return set()
         back = Kin.WHOLES if cue.kin is Kin.PARTS else Kin.PARTS
         found = [
-            {self.ids[relative] for relative in self.kin(uid, back, transitive=cue.transitive)}
-            for uid in cue.uids
-            if uid in self.ids
+            {self.ids[relative] for relative in self.kin(uid, back, transitive=cue.transitive) if relative in self.ids}
+            for uid in known
         ]
         return set().union(*found) if cue.relation is SetRelation.INTERSECTS else set.intersection(*found)

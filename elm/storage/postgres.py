@@ -22,6 +22,7 @@ from elm.storage import write_statements as sql
 from elm.storage.batch import made_ready
 from elm.storage.connections import Connection, repeated
 from elm.storage.cue_compiler import CompiledCue, compile_cue
+from elm.storage.postgres_forgetting import PostgresForgetting
 from elm.storage.postgres_log import PostgresLog
 from elm.storage.rows import moment
 from elm.storage.session import Session
@@ -49,7 +50,7 @@ CHUNK = 1_000
 _CHUNKED = psycopg.capabilities.has_stream_chunked()
 
 
-class PostgresStore:
+class PostgresStore(PostgresForgetting):
     """The `Store` over one schema of a PostgreSQL database; safe to share between threads."""
 
     def __init__(self, dsn: str, memory: str) -> None:
@@ -85,7 +86,8 @@ class PostgresStore:
         with self._connections.writing() as connection:
             done = event_writing.commit(connection, arrival.event, row, now)
             if done is None:
-                return event_writing.same_or_refused(arrival.event, partial(self._session.stored, connection))
+                stored = partial(self._session.stored, connection)
+                return event_writing.same_or_refused(connection, arrival.event, stored)
             self.log.tell(connection)
         return done
 
@@ -129,7 +131,7 @@ class PostgresStore:
                 self.log.tell(connection)
                 return closed
             stored = next(self._session.stored(connection, [uid]), None)
-            return event_writing.why_not_closed(uid, end, stored)
+            return event_writing.why_not_closed(connection, uid, end, stored)
 
     # Recalling
 
@@ -253,6 +255,8 @@ class PostgresStore:
             last_begin=times[1],
             last_recorded_at=times[2],
             bytes=int(row[10]),
+            forgotten=row[11],
+            tombstones=row[12],
         )
 
     def close(self) -> None:

@@ -250,5 +250,7 @@ SELECT (SELECT count(*) FROM event), (SELECT count(*) FROM event WHERE parts <> 
        (SELECT count(DISTINCT agent) FROM event), (SELECT min(lower(period)) FROM event),
        (SELECT max(lower(period)) FROM event), (SELECT max(recorded_at) FROM event),
        (SELECT coalesce(sum(pg_total_relation_size(c.oid)), 0)::bigint FROM pg_class c
-        JOIN pg_namespace n ON n.oid = c.relnamespace WHERE n.nspname = %(memory)s AND c.relkind = 'r')
+        JOIN pg_namespace n ON n.oid = c.relnamespace WHERE n.nspname = %(memory)s AND c.relkind = 'r'),
+       (SELECT coalesce(sum(events), 0)::bigint FROM forgetting) + (SELECT count(*) FROM tombstone),
+       (SELECT count(*) FROM tombstone)
 """

@@ -10,12 +10,16 @@ from sqlalchemy import (
     TIMESTAMP,
     BigInteger,
     ColumnElement,
+    Double,
     FromClause,
     Integer,
     LargeBinary,
     Select,
     Text,
+    and_,
     bindparam,
+    case,
+    extract,
     func,
     literal_column,
     select,
@@ -27,7 +31,7 @@ from elm.cues.algebra import And, Place
 from elm.interval import Window
 from elm.storage.conditions.rule import Bind, Condition
 from elm.storage.cue_compiler import CompiledCue
-from elm.storage.hints import is_guess
+from elm.storage.hints import is_guess, is_in_order
 from elm.storage.tables import event, frame
 from elm.store import Nearest, Order, Query
 
@@ -64,13 +68,20 @@ def found_rows(compiled: CompiledCue, query: Query, *, pinned: bool, near: Windo
 
 
 def _nearest(compiled: CompiledCue, query: Query) -> Any:
-    """The nearest events, and all that are as far as the last: by distance alone, for so the index has them."""
+    """The nearest events, and all that are as far as the last: by distance alone, for so the index has them.
+
+    Where they stand is asked afterwards by their ids: of rows that an index scan by distance had to put
+    right in order, PostgreSQL gives the ctid of another row.
+    """
     distance, _ = order(query)
-    place = [row(event).label("row"), distance.label("distance"), event.c.id]
+    place = [distance.label("distance"), event.c.id]
     limit = bindparam("limit", type_=BigInteger)
     ties = select(*place).where(*conditions(compiled, query, event)).order_by(distance).fetch(limit, with_ties=True)
     near = ties.subquery("ties")
-    return select(near).order_by(*keys(query, near)).limit(limit).subquery("nearest")
+    first = select(near).order_by(*keys(query, near)).limit(limit).subquery("first")
+    standing = event.alias("standing")
+    where = select(row(standing)).where(standing.c.id == first.c.id).scalar_subquery()
+    return select(where.label("row"), first).subquery("nearest")
 
 
 def _scanned(compiled: CompiledCue, query: Query) -> Any:
@@ -83,8 +94,13 @@ def _scanned(compiled: CompiledCue, query: Query) -> Any:
 
 
 def walks(query: Query, *, pinned: bool) -> bool:
-    """Whether the first rows may be found by walking the begin index: an answer that can only be small is sorted."""
+    """Whether the first rows may be found by walking the begin index: an answer that can only be small is sorted.
+
+    And one that an index has in order already is read from there.
+    """
     if query.limit is None or pinned or query.limit >= WALK_MOST:
+        return False
+    if is_in_order(query.cue) and query.order is not Order.ID:
         return False
     return not isinstance(query.order, Nearest)
 
@@ -94,8 +110,8 @@ def _first(compiled: CompiledCue, query: Query, near: Window) -> Any:
 
     The planner takes a cue's hits to be spread evenly over time; where they are not, it walks the begin
     index to its far end (377 ms where 6 would do). So, each step only where those before it did not do:
-    glance at the next rows; search for a handful by an index; walk a bounded number of rows; collect all
-    candidates and sort them (docs/adr/0009).
+    glance at the next rows; search for a handful by an index; walk a bounded number of rows; search by an index
+    as far as it takes by what the walk found; collect all candidates and sort them (docs/adr/0009).
     """
     limit = bindparam("limit", type_=BigInteger)
     steps: list[Select[Any]] = []
@@ -113,7 +129,14 @@ def _first(compiled: CompiledCue, query: Query, near: Window) -> Any:
         unsolved.append(too_many)
     walk = _walked(compiled, query, near, "walk", unsolved)
     filled = _count(walk) >= limit
-    steps += [select(walk).where(filled), _collected(compiled, query, [*unsolved, ~filled])]
+    steps.append(select(walk).where(filled))
+    unsolved.append(~filled)
+    if compiled.search is not None and query.order is not Order.ID:
+        stretch = _stretch(compiled, query, walk, limit, unsolved)
+        filled = _count(stretch) >= limit
+        steps.append(select(stretch).where(filled))
+        unsolved.append(~filled)
+    steps.append(_collected(compiled, query, unsolved))
     found = union_all(*steps).subquery("found")
     return select(found).order_by(*keys(query, found)).limit(limit).subquery("ids")
 
@@ -131,8 +154,50 @@ def _walked(compiled: CompiledCue, query: Query, near: Window, name: str, when: 
     rows = select(event, *_place(event)).where(*bounds, *_after(query, event)).order_by(*order(query))
     rows_near = rows.limit(bindparam(name, type_=Integer)).subquery("near")
     matching = select(rows_near.c.row, rows_near.c.begin, rows_near.c.id)
-    ordered = matching.where(*when, compiled.condition(rows_near)).order_by(*keys(query, rows_near))
+    glimpse = [] if compiled.glimpse is None else [compiled.glimpse(rows_near)]
+    ordered = matching.where(*when, *glimpse, compiled.condition(rows_near)).order_by(*keys(query, rows_near))
     return ordered.limit(bindparam("limit", type_=BigInteger)).cte(name).prefix_with("MATERIALIZED")
+
+
+def _stretch(compiled: CompiledCue, query: Query, walk: Any, limit: Bind, when: list[Condition]) -> Any:
+    """All that match within the time in which enough should, if they go on as densely as on the walk.
+
+    Types have an index that knows begins too: a type below many others costs a probe there, and not all it ever
+    had. Of other cues the planner intersects what two indexes find, before it reads a row: worth it unless the
+    stretch has many times as many events as match in all.
+    """
+    number: ColumnElement[int] = func.count()
+    factor: ColumnElement[Any] = literal_column(_STRETCH_FACTOR)
+    first, last = func.min(walk.c.begin), func.max(walk.c.begin)
+    lasts = extract("epoch", last - first) / (number - literal_column("1")) * limit * factor
+    # Bounded, for a time beyond the calendar would be an error.
+    bounds: tuple[ColumnElement[Any], ColumnElement[Any]] = (
+        (first, func.to_timestamp(func.least(extract("epoch", first) + lasts, literal_column("1e11"))))
+        if query.order is Order.BEGIN
+        else (func.to_timestamp(func.greatest(extract("epoch", last) - lasts, literal_column("-1e11"))), last)
+    )
+    enough = number >= literal_column(_STRETCH_FEWEST)
+    least, most = (select(case((enough, bound))).select_from(walk).scalar_subquery() for bound in bounds)
+    between = [begin(event) >= least, begin(event) <= most]
+    if compiled.narrow is not None:
+        worth, search = enough, [compiled.narrow(event)]
+    else:
+        looked_at = bindparam("walk", type_=Integer)
+        share = looked_at * looked_at * limit * literal_column(_STRETCH_SHARE)
+        worth, search = and_(enough, number * number * _events() > share), []
+    when = [*when, select(worth).select_from(walk).scalar_subquery()]
+    return _collected(compiled, query, [*when, *search, *between]).cte("stretch").prefix_with("MATERIALIZED")
+
+
+_STRETCH_FEWEST, _STRETCH_FACTOR = "5", "1.5"
+"""How many events the walk must have found to tell how dense they are, and what is added for chance."""
+_STRETCH_SHARE = "0.05"
+"""What it takes to find an event of the stretch in the index, of what it takes to read one that matches."""
+
+
+def _events() -> ColumnElement[Any]:
+    """About how many events there are, as far as the server knows without counting."""
+    return literal_column("(SELECT reltuples FROM pg_class WHERE oid = 'event'::regclass)", type_=Double)
 
 
 def _searched(

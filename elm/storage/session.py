@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 from uuid import UUID
 
@@ -62,6 +62,18 @@ class Session:
         # The connection that streams is busy.
         with self.connections.recalling() as other:
             self.names.learn(other, types, frames)
+
+    def type_names(self, connection: Connection, numbers: Iterable[int]) -> dict[int, str]:
+        """The names of types by their numbers, these among them."""
+        self.names.learn(connection, numbers, [])
+        return self.names.types
+
+    def frame_name(self, number: int) -> str:
+        """The name of a frame; asked for over a connection of its own, for another may be busy."""
+        if number not in self.names.frames:
+            with self.connections.recalling() as other:
+                self.names.learn(other, [], [number])
+        return self.names.frames[number]
 
     def stored(self, connection: Connection, uids: Sequence[UUID]) -> Iterator[StoredEvent]:
         """The events with these uids, as the given connection's transaction sees them."""

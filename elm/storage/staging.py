@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from datetime import datetime
 from itertools import islice
 from typing import NamedTuple
+from uuid import UUID
 
 from elm.storage import encoding
 from elm.storage import write_statements as sql
@@ -39,6 +40,12 @@ def stage(connection: Connection, rows: Iterable[tuple[int, int, encoding.Row]])
     connection.execute(sql.CREATE_STAGING)
     numbered = ((encoding.int8(number), encoding.int4(level), *row) for number, level, row in rows)
     _copy(connection, sql.COPY_STAGING, numbered)
+
+
+def lock_parts(connection: Connection, uids: Sequence[UUID]) -> bool:
+    """Have nobody close or forget the events of these uids before the transaction ends; whether one is a tombstone."""
+    ((_, forgotten),) = connection.execute(sql.LOCK_PARTS, {"uids": uids}).fetchall()
+    return bool(forgotten)
 
 
 def log(connection: Connection, written: Iterable[Written], now: datetime) -> None:

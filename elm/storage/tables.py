@@ -24,7 +24,7 @@ from sqlalchemy import (
 )
 from sqlalchemy.dialects.postgresql import JSON, TSTZRANGE
 
-REVISION = "0002"
+REVISION = "0004"
 """The migration that makes the tables as they stand here."""
 
 metadata = MetaData(
@@ -136,6 +136,8 @@ for _name in ("feature_tokens", "feature_names"):
     )
 # What lies within a set has its first and last token in it: `features.ends`.
 Index("event_feature_ends_idx", event.c.feature_ends)
+# Finds whole sets of names, and so those that lie within a small one; names alone repeat too much (docs/adr/0011).
+Index("event_feature_names_set_idx", func.hash_array(event.c.feature_names))
 # A hash index would be quadratic where payloads repeat; the digest also fits where a payload does not.
 Index("event_payload_idx", func.sha256(event.c.payload), postgresql_where=event.c.payload.is_not(None))
 # Without the begin: equal keys then share one entry, and most events of a memory have the same agent.
@@ -146,12 +148,51 @@ part = Table(
     "part",
     metadata,
     Column("whole_id", ForeignKey("event.id"), nullable=False),
-    Column("part_id", ForeignKey("event.id"), nullable=False),
+    # An event or a tombstone; whoever writes links locks what they lead to.
+    Column("part_id", BigInteger, nullable=False),
     Column("ordinal", Integer, nullable=False),
     Column("whole_uid", Uuid, nullable=False),
     PrimaryKeyConstraint("whole_id", "part_id"),
     CheckConstraint("part_id < whole_id", name="part_before_whole"),
     Index("part_part_id_idx", "part_id", "whole_id", postgresql_include=["whole_uid"]),
+)
+
+tombstone = Table(
+    "tombstone",
+    metadata,
+    # The forgotten event's own, so that the links to it lead here.
+    Column("id", BigInteger, primary_key=True, autoincrement=False),
+    Column("uid", Uuid, nullable=False, unique=True),
+    Column("period", TSTZRANGE, nullable=False),
+    Column("frame_id", Integer),
+    Column("region", _polygon()),
+    Column("subject_frame_id", Integer),
+    Column("subject", _polygon()),
+    Column("agent", _c_text()),
+    Column("run", Uuid, nullable=False),
+    CheckConstraint(
+        "lower_inc(period) AND upper_inc(period) AND NOT lower_inf(period)"
+        " AND (region IS NULL) = (frame_id IS NULL) AND (subject IS NULL) = (subject_frame_id IS NULL)",
+        name="whole",
+    ),
+)
+
+forgetting = Table(
+    "forgetting",
+    metadata,
+    Column("run", Uuid, primary_key=True),
+    Column("at", TIMESTAMP(timezone=True), nullable=False),
+    Column("events", BigInteger, nullable=False),
+    Column("period", TSTZRANGE),
+)
+
+forgetting_place = Table(
+    "forgetting_place",
+    metadata,
+    Column("run", ForeignKey("forgetting.run"), primary_key=True),
+    Column("kind", SmallInteger, primary_key=True, autoincrement=False),
+    Column("frame_id", Integer, primary_key=True, autoincrement=False),
+    Column("hull", _polygon(), nullable=False),
 )
 
 log_inbox = Table(
@@ -213,3 +254,8 @@ LOG_TICK = 4
 """`kind` of a tick: time went by, at most to `deadline`."""
 LOG_PUNCTUATION = 5
 """`kind` of a promise that nothing that ended before `deadline` is to come."""
+
+HULL_OF_REGIONS = 1
+"""`kind` of the hull of where the observer was, in the place of a forgetting."""
+HULL_OF_SUBJECTS = 2
+"""`kind` of the hull of where the things were that the events were about."""

@@ -40,8 +40,21 @@ def _filled(statement: str) -> str:
         .replace("<agrees g.>", _AGREES.replace("<given>", "g."))
         .replace("<agrees s.>", _AGREES.replace("<given>", "s."))
         .replace("<kind>", _KIND)
+        .replace("<$1 not forgotten>", _NOT_FORGOTTEN.format(uid="$1"))
+        .replace("<staged not forgotten>", _NOT_FORGOTTEN.format(uid="staging.uid"))
+        .replace("<s not forgotten>", _NOT_FORGOTTEN.format(uid="s.uid"))
+        .replace("<tombstones>", _TOMBSTONES)
         .replace("<close>", str(LOG_CLOSE))
     )
+
+
+# A constant to the planner until the memory gets its first tombstone (docs/adr/0010): it costs nothing before.
+_NOT_FORGOTTEN = "(nothing_forgotten() OR NOT EXISTS (SELECT FROM tombstone WHERE tombstone.uid = {uid}))"
+
+
+# Of an event beside its tombstone (docs/adr/0010 says when there is one) the event counts.
+_TOMBSTONES = """SELECT id, uid, period, frame_id, region, subject_frame_id, subject, agent FROM tombstone
+        WHERE NOT EXISTS (SELECT FROM event WHERE event.uid = tombstone.uid)"""
 
 
 # Parameters $1 to $17 are `encoding.COLUMNS` in their order, $18 the time of writing.
@@ -51,7 +64,7 @@ def _filled(statement: str) -> str:
 COMMIT_ATOMIC = _filled("""
 WITH new AS (
     INSERT INTO event (<columns>)
-    VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, $13, $14, $15, $16, $17)
+    SELECT $1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, $13, $14, $15, $16, $17 WHERE <$1 not forgotten>
     ON CONFLICT (uid) DO UPDATE SET uid = excluded.uid WHERE event.content = excluded.content
     RETURNING id, upper_inf(period) AS is_open, xmax <> 0 AS existed
 ), logged AS (
@@ -77,7 +90,7 @@ WITH g AS (
     SELECT $1, $2, x.period, x.frame_id, x.region, x.subject_frame_id, x.subject, $8, $9, $10,
            coalesce($11, x.agent), $12, $13, $14, $15, $16, $17
     FROM x, g
-    WHERE x.found = cardinality($14) AND <agrees g.>
+    WHERE x.found = cardinality($14) AND <agrees g.> AND <$1 not forgotten>
     ON CONFLICT (uid) DO UPDATE SET uid = excluded.uid WHERE event.content = excluded.content
     RETURNING id, uid, agent, upper_inf(period) AS is_open, xmax <> 0 AS existed
 ), linked AS (
@@ -91,6 +104,16 @@ WITH g AS (
 SELECT id, existed FROM new
 """)
 
+# The same where some of the parts are tombstones, which are locked as well: none goes while a whole of it comes.
+COMMIT_OVER_TOMBSTONES = COMMIT_COMPLEX.replace("p AS MATERIALIZED (", "there AS MATERIALIZED (").replace(
+    "), x AS (",
+    _filled("""), forgotten AS MATERIALIZED (
+    <tombstones> AND uid = ANY($14::uuid[]) ORDER BY id FOR SHARE
+), p AS MATERIALIZED (
+    SELECT * FROM there UNION ALL SELECT * FROM forgotten
+), x AS ("""),
+)
+
 # Many events: copied into a temporary table, they go from there level by level, for a statement does not see the
 # rows it inserts itself. Of a load, the atomic ones are copied into the table itself. All have their ids before, and
 # enter the log at the end: both in the order in which they were given, whatever their level.
@@ -99,7 +122,11 @@ RESERVE_IDS = """
 SELECT nextval((SELECT pg_get_serial_sequence('event', 'id')::regclass)) FROM generate_series(1, %s)
 """
 
-CONTENTS = "SELECT uid, content FROM event WHERE uid = ANY(%s)"
+# Of the forgotten that still count as parts no content is known.
+CONTENTS = """
+SELECT uid, content FROM event WHERE uid = ANY(%(uids)s)
+UNION ALL SELECT uid, NULL FROM tombstone WHERE uid = ANY(%(uids)s) AND NOT nothing_forgotten()
+"""
 
 COPY_EVENTS = _filled("COPY event (id, <columns>) FROM STDIN (FORMAT BINARY)")
 
@@ -119,13 +146,21 @@ COPY_STAGING = "COPY staging FROM STDIN (FORMAT BINARY)"
 # What `COMMIT_ATOMIC` does but for the log, for all staged events without parts.
 COMMIT_STAGED = _filled("""
 INSERT INTO event (id, <columns>) OVERRIDING SYSTEM VALUE
-SELECT id, <columns> FROM staging WHERE level = 0 ORDER BY id
+SELECT id, <columns> FROM staging WHERE level = 0 AND <staged not forgotten> ORDER BY id
 ON CONFLICT (uid) DO UPDATE SET uid = excluded.uid WHERE event.content = excluded.content
 RETURNING id, uid, xmax <> 0 AS existed, upper_inf(period) AS is_open, agent
 """)
 
-# Only of parts that were there before: those of the same transaction nobody else can close.
-LOCK_OPEN_PARTS = "SELECT id FROM event WHERE uid = ANY(%s) AND upper_inf(period) ORDER BY id FOR SHARE"
+# Only of parts that were there before: those of the same transaction nobody else can close or forget. How many of
+# them are tombstones.
+LOCK_PARTS = """
+WITH there AS MATERIALIZED (
+    SELECT id FROM event WHERE uid = ANY(%(uids)s) ORDER BY id FOR SHARE
+), forgotten AS MATERIALIZED (
+    SELECT id FROM tombstone WHERE uid = ANY(%(uids)s) AND NOT nothing_forgotten() ORDER BY id FOR SHARE
+)
+SELECT (SELECT count(*) FROM there), (SELECT count(*) FROM forgotten)
+"""
 
 _LEVEL = _filled("""
 WITH p AS MATERIALIZED (
@@ -141,7 +176,7 @@ WITH p AS MATERIALIZED (
            s.feature_names, s.features, coalesce(s.agent, x.agent), s.media_type, s.payload, s.parts,
            s.recorded_at, s.content, s.feature_ends
     FROM staging s JOIN x ON x.whole_id = s.id
-    WHERE s.level = %(level)s AND x.found = cardinality(s.parts) AND <agrees s.>
+    WHERE s.level = %(level)s AND x.found = cardinality(s.parts) AND <agrees s.> AND <s not forgotten>
     ORDER BY s.id
     <conflict>
     RETURNING id, uid, xmax <> 0 AS existed, upper_inf(period) AS is_open, agent
@@ -161,6 +196,14 @@ COMMIT_LEVEL = _LEVEL.replace(
     "<conflict>",
     "ON CONFLICT (uid) DO UPDATE SET uid = excluded.uid WHERE event.content = excluded.content",
 )
+
+# The same where some of the parts are tombstones.
+_ALSO_TOMBSTONES = _filled("""JOIN (
+        SELECT id, uid, period, frame_id, region, subject_frame_id, subject, agent FROM event
+        UNION ALL <tombstones>
+    ) e ON e.uid = asked.uid""")
+LOAD_LEVEL_OVER_TOMBSTONES = LOAD_LEVEL.replace("JOIN event e ON e.uid = asked.uid", _ALSO_TOMBSTONES)
+COMMIT_LEVEL_OVER_TOMBSTONES = COMMIT_LEVEL.replace("JOIN event e ON e.uid = asked.uid", _ALSO_TOMBSTONES)
 
 # Not only statistics: what was loaded is marked as seen by all, so that links are read from their index alone, and
 # what still waits to enter the inverted indexes enters them. It costs a quarter more, and spares each recall pages.
@@ -183,7 +226,12 @@ LOCK_WHOLE = "SELECT uid, upper_inf(period) AS was_open FROM event WHERE id = %(
 
 RECOMPUTE_WHOLE = """
 UPDATE event SET period = (
-    SELECT range_merge(range_agg(p.period)) FROM part l JOIN event p ON p.id = l.part_id WHERE l.whole_id = event.id
+    SELECT range_merge(range_agg(p.period)) FROM (
+        SELECT e.period FROM part l JOIN event e ON e.id = l.part_id WHERE l.whole_id = event.id
+        UNION ALL
+        SELECT t.period FROM part l JOIN tombstone t ON t.id = l.part_id
+        WHERE l.whole_id = event.id AND NOT nothing_forgotten()
+    ) p
 )
 WHERE id = %(id)s
 RETURNING upper_inf(period), agent, ARRAY(SELECT whole_id FROM part WHERE part_id = event.id)

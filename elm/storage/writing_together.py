@@ -39,7 +39,7 @@ class Together:
         answers = []
         for event in self._events:
             if event.uid not in done:
-                done[event.uid] = same_or_refused(event, stored)
+                done[event.uid] = same_or_refused(connection, event, stored)
         for uid in self._asked:
             answers.append(done[uid])
             # The same event once more in one call was there already.
@@ -62,9 +62,10 @@ class Together:
         if above := sorted(set(heights) - {0}):
             own = {UUID(bytes=raw) for _, raw, existed, *_ in found if not existed}
             outside = [part for event in self._events for part in event.parts if part not in own]
-            connection.execute(sql.LOCK_OPEN_PARTS, [outside])
-        for level in above:
-            found += connection.execute(sql.COMMIT_LEVEL, {"level": level}, binary=True).fetchall()
+            over_tombstones = staging.lock_parts(connection, outside)
+            statement = sql.COMMIT_LEVEL_OVER_TOMBSTONES if over_tombstones else sql.COMMIT_LEVEL
+            for level in above:
+                found += connection.execute(statement, {"level": level}, binary=True).fetchall()
         written = [Written(number, is_open, agent) for number, _, existed, is_open, agent in found if not existed]
         staging.log(connection, written, self._now)
         return {

@@ -11,6 +11,7 @@ from uuid import UUID
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from shapely import Polygon
 
 from elm import cues
 from elm.cues.algebra import Cue, Place
@@ -214,6 +215,24 @@ def test_equally_near_events_come_by_id(store: Store) -> None:
     assert list(store.ids(nearest)) == by_distance
     for limit in range(7):
         assert list(store.ids(Query(order=nearest.order, limit=limit))) == by_distance[:limit]
+
+
+def test_the_nearest_are_told_whole_where_their_boxes_come_in_another_order(store: Store) -> None:
+    # Thin diagonals: an index has their boxes by distance, and puts right what it takes from there.
+    places = [(number % 20, number // 20) for number in range(300)]
+    thin = [Polygon([(x, y), (x + 5, y + 5), (x + 5.1, y + 5), (x + 0.1, y)]) for x, y in places]
+    tell(
+        store,
+        story(*(Event(type="Event", interval=span(0, 0), region=Region(polygon=polygon)) for polygon in thin)),
+    )
+    to = Region.box(9, 3, 10, 4)
+    distances = {event.id: event.region.polygon.distance(to.polygon) for event in everything(store) if event.region}
+
+    for limit in (1, 5, 40):
+        query = Query(order=Nearest(to=to), limit=limit)
+        told = ids_of(list(store.find(query)))
+        assert told == list(store.ids(query))
+        assert [distances[number] for number in told] == pytest.approx(sorted(distances.values())[:limit], abs=1e-9)
 
 
 def test_the_nearest_leave_out_what_has_no_such_place(store: Store) -> None:

@@ -10,7 +10,16 @@ import pytest
 
 from elm.cues.algebra import Comparison, SetRelation, TypeRelation
 from elm.cues.codec import cue_from_json, cue_to_json
-from elm.exchange import event_from_json, event_to_json, parse_json, type_from_json, type_to_json
+from elm.exchange import (
+    event_from_json,
+    event_to_json,
+    is_tombstone,
+    parse_json,
+    tombstone_from_json,
+    tombstone_to_json,
+    type_from_json,
+    type_to_json,
+)
 from elm.geometry import SpatialRelation
 from elm.interval import AllenRelation, parse_time
 from elm.store import Cursor
@@ -36,16 +45,15 @@ def kinds(value: Any) -> Any:
     return [[name, type(item), item] for name, item in value]
 
 
-TYPES, EVENTS, RESULTS, CUES = map(examples, ("Types", "Events", "Results", "Cues"))
+EXAMPLES = ("Types", "Events", "Results", "Tombstones", "Cues", "ArmarX snapshots")
+TYPES, EVENTS, RESULTS, TOMBSTONES, CUES, SNAPSHOTS = map(examples, EXAMPLES)
 
 
 def test_no_example_is_passed_over() -> None:
     assert len(re.findall(r"^```json$", PAGE, flags=re.MULTILINE)) == len(
-        re.findall(
-            r"^```json$", "".join(SECTIONS[name] for name in ("Types", "Events", "Results", "Cues")), re.MULTILINE
-        )
+        re.findall(r"^```json$", "".join(SECTIONS[name] for name in EXAMPLES), re.MULTILINE)
     )
-    assert all((TYPES, EVENTS, RESULTS, CUES))
+    assert all((TYPES, EVENTS, RESULTS, TOMBSTONES, CUES, SNAPSHOTS))
 
 
 @pytest.mark.parametrize("line", TYPES)
@@ -55,7 +63,7 @@ def test_types_go_there_and_back(line: str) -> None:
     assert type_to_json(type_from_json(given)) == given
 
 
-@pytest.mark.parametrize("line", [*EVENTS, *RESULTS])
+@pytest.mark.parametrize("line", [*EVENTS, *RESULTS, *SNAPSHOTS])
 def test_events_go_there_and_back(line: str) -> None:
     given = parse_json(line, what="the example")
     event = event_from_json(given).event
@@ -80,6 +88,22 @@ def test_results_are_events_that_say_more(line: str) -> None:
     assert read.ignored == ("id", "wholes")
     assert read.recorded_at == parse_time(given["recorded_at"], what="recorded_at")
     assert given.keys() == event_to_json(read.event).keys() | {"id", "recorded_at", "wholes"}
+
+
+@pytest.mark.parametrize("line", TOMBSTONES)
+def test_tombstones_go_there_and_back(line: str) -> None:
+    given = parse_json(line, what="the example")
+
+    assert is_tombstone(given)
+    assert tombstone_to_json(tombstone_from_json(given)) == given
+
+
+def test_every_key_of_a_tombstone_is_described_and_shown() -> None:
+    shown = [parse_json(line, what="the example")["forgotten"] for line in TOMBSTONES]
+    described = {name for row in rows("Tombstones") for name in re.findall(r"\w+", row[0]) if name != "key"}
+
+    assert described == {key for each in shown for key in each}
+    assert {"uid" in each for each in shown} == {True, False}
 
 
 @pytest.mark.parametrize("line", CUES)

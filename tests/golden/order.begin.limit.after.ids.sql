@@ -26,7 +26,20 @@ WHERE (SELECT count(*) AS count_2
 FROM handful) > %(handful)s::BIGINT AND (near.period <@ tstzrange(%(p0)s::TIMESTAMP WITH TIME ZONE, %(p1)s::TIMESTAMP WITH TIME ZONE, '[]')) AND near.type_id IN (SELECT type_closure.descendant_id
 FROM type_closure
 WHERE type_closure.ancestor_id = %(p2)s::INTEGER) ORDER BY near.begin, near.id
- LIMIT %(limit)s::BIGINT)
+ LIMIT %(limit)s::BIGINT),
+stretch AS MATERIALIZED
+(SELECT event.ctid AS row, lower(event.period) AS begin, event.id AS id
+FROM event
+WHERE (SELECT count(*) AS count_2
+FROM handful) > %(handful)s::BIGINT AND (SELECT count(*) AS count_3
+FROM walk) < %(limit)s::BIGINT AND (SELECT count(*) >= 5 AS anon_1
+FROM walk) AND event.type_id = ANY (array((SELECT type_closure.descendant_id
+FROM type_closure
+WHERE type_closure.ancestor_id = %(p2)s::INTEGER))) AND lower(event.period) >= (SELECT CASE WHEN (count(*) >= 5) THEN min(walk.begin) END AS anon_2
+FROM walk) AND lower(event.period) <= (SELECT CASE WHEN (count(*) >= 5) THEN to_timestamp(least(EXTRACT(epoch FROM min(walk.begin)) + (EXTRACT(epoch FROM max(walk.begin) - min(walk.begin)) / CAST((count(*) - 1) AS NUMERIC)) * %(limit)s::BIGINT * 1.5, 1e11)) END AS anon_3
+FROM walk) AND (event.period <@ tstzrange(%(p0)s::TIMESTAMP WITH TIME ZONE, %(p1)s::TIMESTAMP WITH TIME ZONE, '[]')) AND event.type_id IN (SELECT type_closure.descendant_id
+FROM type_closure
+WHERE type_closure.ancestor_id = %(p2)s::INTEGER) AND (lower(event.period), event.id) > (%(after_begin)s::TIMESTAMP WITH TIME ZONE, %(after_id)s::BIGINT))
  SELECT ids.id
 FROM (SELECT found.row AS row, found.begin AS begin, found.id AS id
 FROM (SELECT glance.row AS row, glance.begin AS begin, glance.id AS id
@@ -38,11 +51,15 @@ WHERE (SELECT count(*) AS count_2
 FROM handful) <= %(handful)s::BIGINT UNION ALL SELECT walk.row AS row, walk.begin AS begin, walk.id AS id
 FROM walk
 WHERE (SELECT count(*) AS count_3
-FROM walk) >= %(limit)s::BIGINT UNION ALL SELECT event.ctid AS row, lower(event.period) AS begin, event.id AS id
+FROM walk) >= %(limit)s::BIGINT UNION ALL SELECT stretch.row AS row, stretch.begin AS begin, stretch.id AS id
+FROM stretch
+WHERE (SELECT count(*) AS count_4
+FROM stretch) >= %(limit)s::BIGINT UNION ALL SELECT event.ctid AS row, lower(event.period) AS begin, event.id AS id
 FROM event
 WHERE (SELECT count(*) AS count_2
 FROM handful) > %(handful)s::BIGINT AND (SELECT count(*) AS count_3
-FROM walk) < %(limit)s::BIGINT AND (event.period <@ tstzrange(%(p0)s::TIMESTAMP WITH TIME ZONE, %(p1)s::TIMESTAMP WITH TIME ZONE, '[]')) AND event.type_id IN (SELECT type_closure.descendant_id
+FROM walk) < %(limit)s::BIGINT AND (SELECT count(*) AS count_4
+FROM stretch) < %(limit)s::BIGINT AND (event.period <@ tstzrange(%(p0)s::TIMESTAMP WITH TIME ZONE, %(p1)s::TIMESTAMP WITH TIME ZONE, '[]')) AND event.type_id IN (SELECT type_closure.descendant_id
 FROM type_closure
 WHERE type_closure.ancestor_id = %(p2)s::INTEGER) AND (lower(event.period), event.id) > (%(after_begin)s::TIMESTAMP WITH TIME ZONE, %(after_id)s::BIGINT)) AS found ORDER BY found.begin, found.id
  LIMIT %(limit)s::BIGINT) AS ids ORDER BY ids.begin, ids.id

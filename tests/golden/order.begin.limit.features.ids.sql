@@ -22,7 +22,18 @@ WHERE (SELECT count(*) AS count_2
 FROM handful) > %(handful)s::BIGINT AND (near.feature_names @> %(p0)s::TEXT[]) AND (EXISTS (SELECT 1
 FROM json_array_elements(near.features) AS anon_3(value)
 WHERE CASE WHEN ((anon_3.value ->> 0) = %(p1)s::VARCHAR AND json_typeof(anon_3.value -> 1) = 'number') THEN CAST(anon_3.value ->> 1 AS NUMERIC) < CAST(%(p2)s::VARCHAR AS NUMERIC) ELSE false END)) ORDER BY near.begin, near.id
- LIMIT %(limit)s::BIGINT)
+ LIMIT %(limit)s::BIGINT),
+stretch AS MATERIALIZED
+(SELECT event.ctid AS row, lower(event.period) AS begin, event.id AS id
+FROM event
+WHERE (SELECT count(*) AS count_2
+FROM handful) > %(handful)s::BIGINT AND (SELECT count(*) AS count_3
+FROM walk) < %(limit)s::BIGINT AND (SELECT count(*) >= 5 AND count(*) * count(*) * (SELECT reltuples FROM pg_class WHERE oid = 'event'::regclass) > %(walk)s::INTEGER * %(walk)s::INTEGER * %(limit)s::BIGINT * 0.05 AS anon_4
+FROM walk) AND lower(event.period) >= (SELECT CASE WHEN (count(*) >= 5) THEN min(walk.begin) END AS anon_5
+FROM walk) AND lower(event.period) <= (SELECT CASE WHEN (count(*) >= 5) THEN to_timestamp(least(EXTRACT(epoch FROM min(walk.begin)) + (EXTRACT(epoch FROM max(walk.begin) - min(walk.begin)) / CAST((count(*) - 1) AS NUMERIC)) * %(limit)s::BIGINT * 1.5, 1e11)) END AS anon_6
+FROM walk) AND (event.feature_names @> %(p0)s::TEXT[]) AND (EXISTS (SELECT 1
+FROM json_array_elements(event.features) AS anon_7(value)
+WHERE CASE WHEN ((anon_7.value ->> 0) = %(p1)s::VARCHAR AND json_typeof(anon_7.value -> 1) = 'number') THEN CAST(anon_7.value ->> 1 AS NUMERIC) < CAST(%(p2)s::VARCHAR AS NUMERIC) ELSE false END)))
  SELECT ids.id
 FROM (SELECT found.row AS row, found.begin AS begin, found.id AS id
 FROM (SELECT glance.row AS row, glance.begin AS begin, glance.id AS id
@@ -36,11 +47,15 @@ FROM json_array_elements(handful.features) AS anon_2(value)
 WHERE CASE WHEN ((anon_2.value ->> 0) = %(p1)s::VARCHAR AND json_typeof(anon_2.value -> 1) = 'number') THEN CAST(anon_2.value ->> 1 AS NUMERIC) < CAST(%(p2)s::VARCHAR AS NUMERIC) ELSE false END)) UNION ALL SELECT walk.row AS row, walk.begin AS begin, walk.id AS id
 FROM walk
 WHERE (SELECT count(*) AS count_3
-FROM walk) >= %(limit)s::BIGINT UNION ALL SELECT event.ctid AS row, lower(event.period) AS begin, event.id AS id
+FROM walk) >= %(limit)s::BIGINT UNION ALL SELECT stretch.row AS row, stretch.begin AS begin, stretch.id AS id
+FROM stretch
+WHERE (SELECT count(*) AS count_4
+FROM stretch) >= %(limit)s::BIGINT UNION ALL SELECT event.ctid AS row, lower(event.period) AS begin, event.id AS id
 FROM event
 WHERE (SELECT count(*) AS count_2
 FROM handful) > %(handful)s::BIGINT AND (SELECT count(*) AS count_3
-FROM walk) < %(limit)s::BIGINT AND (event.feature_names @> %(p0)s::TEXT[]) AND (EXISTS (SELECT 1
-FROM json_array_elements(event.features) AS anon_4(value)
-WHERE CASE WHEN ((anon_4.value ->> 0) = %(p1)s::VARCHAR AND json_typeof(anon_4.value -> 1) = 'number') THEN CAST(anon_4.value ->> 1 AS NUMERIC) < CAST(%(p2)s::VARCHAR AS NUMERIC) ELSE false END))) AS found ORDER BY found.begin, found.id
+FROM walk) < %(limit)s::BIGINT AND (SELECT count(*) AS count_4
+FROM stretch) < %(limit)s::BIGINT AND (event.feature_names @> %(p0)s::TEXT[]) AND (EXISTS (SELECT 1
+FROM json_array_elements(event.features) AS anon_8(value)
+WHERE CASE WHEN ((anon_8.value ->> 0) = %(p1)s::VARCHAR AND json_typeof(anon_8.value -> 1) = 'number') THEN CAST(anon_8.value ->> 1 AS NUMERIC) < CAST(%(p2)s::VARCHAR AS NUMERIC) ELSE false END))) AS found ORDER BY found.begin, found.id
  LIMIT %(limit)s::BIGINT) AS ids ORDER BY ids.begin, ids.id

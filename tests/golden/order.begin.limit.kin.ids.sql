@@ -12,7 +12,9 @@ FROM part AS step JOIN seen ON step.whole_id = seen.id)
 FROM seen
 WHERE seen.id != ALL (array((SELECT other.id
 FROM event AS other
-WHERE other.uid = ANY (%(p0)s::UUID[])))))) ORDER BY near.begin, near.id
+WHERE other.uid = ANY (%(p0)s::UUID[]) UNION ALL SELECT tombstone.id
+FROM tombstone
+WHERE NOT nothing_forgotten() AND tombstone.uid = ANY (%(p0)s::UUID[])))))) ORDER BY near.begin, near.id
  LIMIT %(limit)s::BIGINT)
  SELECT ids.id
 FROM (SELECT found.row AS row, found.begin AS begin, found.id AS id
@@ -31,5 +33,7 @@ FROM part AS step JOIN seen ON step.whole_id = seen.id)
 FROM seen
 WHERE seen.id != ALL (array((SELECT other.id
 FROM event AS other
-WHERE other.uid = ANY (%(p0)s::UUID[]))))))) AS found ORDER BY found.begin, found.id
+WHERE other.uid = ANY (%(p0)s::UUID[]) UNION ALL SELECT tombstone.id
+FROM tombstone
+WHERE NOT nothing_forgotten() AND tombstone.uid = ANY (%(p0)s::UUID[]))))))) AS found ORDER BY found.begin, found.id
  LIMIT %(limit)s::BIGINT) AS ids ORDER BY ids.begin, ids.id

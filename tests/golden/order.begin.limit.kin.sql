@@ -12,7 +12,9 @@ FROM part AS step JOIN seen ON step.whole_id = seen.id)
 FROM seen
 WHERE seen.id != ALL (array((SELECT other.id
 FROM event AS other
-WHERE other.uid = ANY (%(p0)s::UUID[])))))) ORDER BY near.begin, near.id
+WHERE other.uid = ANY (%(p0)s::UUID[]) UNION ALL SELECT tombstone.id
+FROM tombstone
+WHERE NOT nothing_forgotten() AND tombstone.uid = ANY (%(p0)s::UUID[])))))) ORDER BY near.begin, near.id
  LIMIT %(limit)s::BIGINT)
  SELECT there.id, there.uid, there.type_id, there.period, there.frame_id, there.region AS region, there.subject_frame_id, there.subject AS subject, there.features, there.agent, there.media_type, there.payload, there.parts, array((SELECT up.whole_uid
 FROM part AS up
@@ -33,7 +35,9 @@ FROM part AS step JOIN seen ON step.whole_id = seen.id)
 FROM seen
 WHERE seen.id != ALL (array((SELECT other.id
 FROM event AS other
-WHERE other.uid = ANY (%(p0)s::UUID[]))))))) AS found ORDER BY found.begin, found.id
+WHERE other.uid = ANY (%(p0)s::UUID[]) UNION ALL SELECT tombstone.id
+FROM tombstone
+WHERE NOT nothing_forgotten() AND tombstone.uid = ANY (%(p0)s::UUID[]))))))) AS found ORDER BY found.begin, found.id
  LIMIT %(limit)s::BIGINT) AS ids JOIN LATERAL (SELECT event.id AS id, event.uid AS uid, event.type_id AS type_id, event.period AS period, event.frame_id AS frame_id, event.region AS region, event.subject_frame_id AS subject_frame_id, event.subject AS subject, event.feature_tokens AS feature_tokens, event.feature_names AS feature_names, event.features AS features, event.agent AS agent, event.media_type AS media_type, event.payload AS payload, event.parts AS parts, event.recorded_at AS recorded_at, event.content AS content, event.feature_ends AS feature_ends
 FROM event
 WHERE event.ctid = ids.row

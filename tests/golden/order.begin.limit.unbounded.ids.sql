@@ -18,7 +18,16 @@ FROM event ORDER BY lower(event.period), event.id
  LIMIT %(walk)s::INTEGER) AS near
 WHERE (SELECT count(*) AS count_2
 FROM handful) > %(handful)s::BIGINT AND near.agent = %(p0)s::VARCHAR ORDER BY near.begin, near.id
- LIMIT %(limit)s::BIGINT)
+ LIMIT %(limit)s::BIGINT),
+stretch AS MATERIALIZED
+(SELECT event.ctid AS row, lower(event.period) AS begin, event.id AS id
+FROM event
+WHERE (SELECT count(*) AS count_2
+FROM handful) > %(handful)s::BIGINT AND (SELECT count(*) AS count_3
+FROM walk) < %(limit)s::BIGINT AND (SELECT count(*) >= 5 AND count(*) * count(*) * (SELECT reltuples FROM pg_class WHERE oid = 'event'::regclass) > %(walk)s::INTEGER * %(walk)s::INTEGER * %(limit)s::BIGINT * 0.05 AS anon_1
+FROM walk) AND lower(event.period) >= (SELECT CASE WHEN (count(*) >= 5) THEN min(walk.begin) END AS anon_2
+FROM walk) AND lower(event.period) <= (SELECT CASE WHEN (count(*) >= 5) THEN to_timestamp(least(EXTRACT(epoch FROM min(walk.begin)) + (EXTRACT(epoch FROM max(walk.begin) - min(walk.begin)) / CAST((count(*) - 1) AS NUMERIC)) * %(limit)s::BIGINT * 1.5, 1e11)) END AS anon_3
+FROM walk) AND event.agent = %(p0)s::VARCHAR)
  SELECT ids.id
 FROM (SELECT found.row AS row, found.begin AS begin, found.id AS id
 FROM (SELECT glance.row AS row, glance.begin AS begin, glance.id AS id
@@ -30,9 +39,13 @@ WHERE (SELECT count(*) AS count_2
 FROM handful) <= %(handful)s::BIGINT UNION ALL SELECT walk.row AS row, walk.begin AS begin, walk.id AS id
 FROM walk
 WHERE (SELECT count(*) AS count_3
-FROM walk) >= %(limit)s::BIGINT UNION ALL SELECT event.ctid AS row, lower(event.period) AS begin, event.id AS id
+FROM walk) >= %(limit)s::BIGINT UNION ALL SELECT stretch.row AS row, stretch.begin AS begin, stretch.id AS id
+FROM stretch
+WHERE (SELECT count(*) AS count_4
+FROM stretch) >= %(limit)s::BIGINT UNION ALL SELECT event.ctid AS row, lower(event.period) AS begin, event.id AS id
 FROM event
 WHERE (SELECT count(*) AS count_2
 FROM handful) > %(handful)s::BIGINT AND (SELECT count(*) AS count_3
-FROM walk) < %(limit)s::BIGINT AND event.agent = %(p0)s::VARCHAR) AS found ORDER BY found.begin, found.id
+FROM walk) < %(limit)s::BIGINT AND (SELECT count(*) AS count_4
+FROM stretch) < %(limit)s::BIGINT AND event.agent = %(p0)s::VARCHAR) AS found ORDER BY found.begin, found.id
  LIMIT %(limit)s::BIGINT) AS ids ORDER BY ids.begin, ids.id

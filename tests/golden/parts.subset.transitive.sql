@@ -9,4 +9,6 @@ FROM part AS step JOIN seen ON step.whole_id = seen.id)
 FROM seen
 WHERE seen.id != ALL (array((SELECT other.id
 FROM event AS other
-WHERE other.uid = ANY (%(p0)s::UUID[])))))) ORDER BY lower(event.period), event.id
+WHERE other.uid = ANY (%(p0)s::UUID[]) UNION ALL SELECT tombstone.id
+FROM tombstone
+WHERE NOT nothing_forgotten() AND tombstone.uid = ANY (%(p0)s::UUID[])))))) ORDER BY lower(event.period), event.id

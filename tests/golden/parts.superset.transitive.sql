@@ -5,7 +5,9 @@ WHERE event.id IN (WITH RECURSIVE reached(own_id, start_id) AS
 FROM part
 WHERE part.part_id IN (SELECT other.id
 FROM event AS other
-WHERE other.uid = ANY (%(p0)s::UUID[])) UNION SELECT step.whole_id AS whole_id, reached.start_id AS start_id
+WHERE other.uid = ANY (%(p0)s::UUID[]) UNION ALL SELECT tombstone.id
+FROM tombstone
+WHERE NOT nothing_forgotten() AND tombstone.uid = ANY (%(p0)s::UUID[])) UNION SELECT step.whole_id AS whole_id, reached.start_id AS start_id
 FROM part AS step JOIN reached ON step.part_id = reached.own_id)
  SELECT reached.own_id
 FROM reached GROUP BY reached.own_id

@@ -176,9 +176,12 @@ QUERIES: Mapping[str, Query] = {
     "order.begin.limit.pinned": Query(cue=cues.uid(_ONE), limit=10),
     "order.begin.limit.large": Query(cue=_CUE, limit=recall_statements.WALK_MOST),
     "order.begin.limit.features": Query(cue=cues.feature("force", "<", 1), limit=10),
+    "order.begin.limit.exactly": Query(cue=cues.exactly("Grasp"), limit=10),
+    "order.begin.limit.region": Query(cue=cues.region("intersects", _PLACE) | cues.region("touches", _PLACE), limit=10),
     "order.begin.limit.kin": Query(cue=cues.parts("subset", [_ONE], transitive=True), limit=10),
     "nearest": Query(cue=_CUE, order=_NEAREST),
     "nearest.limit": Query(cue=_CUE, order=_NEAREST, limit=10),
+    "nearest.limit.everything": Query(order=_NEAREST, limit=10),
     "nearest.subject.limit": Query(cue=_CUE, order=Nearest(to=_PLACE, place=Place.SUBJECT), limit=10),
 }
 

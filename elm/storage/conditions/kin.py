@@ -2,13 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, assert_never
 
-from sqlalchemy import FromClause, Select, Uuid, all_, and_, any_, exists, func, literal_column, not_, select, true
+from sqlalchemy import (
+    Boolean,
+    FromClause,
+    Select,
+    Uuid,
+    all_,
+    and_,
+    any_,
+    exists,
+    func,
+    literal_column,
+    not_,
+    select,
+    true,
+    union_all,
+)
 
 from elm.cues.algebra import Kin, KinCue, SetRelation
 from elm.storage.conditions.rule import UIDS, Bind, Condition, Rule
-from elm.storage.tables import event, part
+from elm.storage.tables import event, part, tombstone
 
 
 def kin(cue: KinCue) -> Rule:
@@ -20,7 +36,7 @@ def kin(cue: KinCue) -> Rule:
     lines = _Lines(cue.kin, transitive=cue.transitive)
 
     def build(e: FromClause, p: Bind) -> Condition:
-        given = select(_other.c.id).where(_other.c.uid == any_(p))
+        given = _ids(cue.kin, lambda e: e.c.uid == any_(p))
         match cue.relation:
             case SetRelation.INTERSECTS:
                 return e.c.id.in_(lines.relatives_of(given))
@@ -50,7 +66,8 @@ def _own_parts(cue: KinCue) -> Rule:
             return within
         if not cue.uids:
             return e.c.parts == p if cue.relation is SetRelation.EQUAL else true()
-        wholes = select(part.c.whole_id).join(_other, _other.c.id == part.c.part_id).where(_other.c.uid == one)
+        other = _ids(Kin.PARTS, lambda e: e.c.uid == one).subquery("named")
+        wholes = select(part.c.whole_id).join(other, other.c.id == part.c.part_id)
         covers = and_(e.c.id == any_(func.array(wholes.scalar_subquery())), e.c.parts.op("@>", is_comparison=True)(p))
         return and_(covers, within) if cue.relation is SetRelation.EQUAL else covers
 
@@ -59,6 +76,18 @@ def _own_parts(cue: KinCue) -> Rule:
 
 _BY_ROW = (SetRelation.EQUAL, SetRelation.SUPERSET, SetRelation.SUBSET)
 _other = event.alias("other")
+
+
+def _ids(kin: Kin, are_meant: Callable[[FromClause], Condition]) -> Any:
+    """The ids of some events; as parts also those of tombstones, which are wholes of nothing.
+
+    What says that there are none is a constant to the planner: it costs nothing until there is the first.
+    """
+    events = select(_other.c.id).where(are_meant(_other))
+    if kin is Kin.WHOLES:
+        return events
+    pristine = func.nothing_forgotten(type_=Boolean)
+    return union_all(events, select(tombstone.c.id).where(not_(pristine), are_meant(tombstone)))
 
 
 class _Lines:

@@ -36,6 +36,10 @@ class Rule:
 
     The same as `build` where it finds no others; None where no index serves.
     """
+    glimpse: Callable[..., Any] | None = None
+    """Likewise: something cheap that all fulfil that match, to be asked first of rows that no index chose."""
+    narrow: Callable[..., Any] | None = None
+    """Likewise: what all fulfil that match, as an index understands it that knows begins too; None without one."""
 
     @property
     def is_search(self) -> bool:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import combinations
 from typing import Any, assert_never
 
 from sqlalchemy import (
     ARRAY,
     BigInteger,
+    ColumnElement,
     FromClause,
+    Integer,
     Numeric,
     Text,
     and_,
@@ -23,6 +27,7 @@ from sqlalchemy import (
     select,
     true,
 )
+from sqlalchemy.dialects.postgresql import array
 from sqlalchemy.types import TypeEngine
 
 from elm.cues.algebra import Comparison, FeatureCue, FeatureNamesCue, FeaturesCue, SetRelation
@@ -33,7 +38,44 @@ from elm.storage.conditions.rule import TEXTS, Bind, Condition, Rule, indexed
 
 def feature_names(cue: FeatureNamesCue) -> Rule:
     """The names of an event's features against a given set."""
-    return _text_set("feature_names", cue.relation, name_tokens(cue.names), "feature_names")
+    given = name_tokens(cue.names)
+    rule = _text_set("feature_names", cue.relation, given, "feature_names")
+    # The inverted index would visit all events that share a name, or all that have it; IS TRUE keeps the planner
+    # from taking it.
+    match cue.relation:
+        case SetRelation.EQUAL:
+            return indexed(
+                rule.key, rule.values, lambda e, p: and_(rule.build(e, p).is_(true()), names_hash(e) == _hash(p))
+            )
+        case SetRelation.SUBSET if len(given) <= _MOST_SUBSETS:
+            return _by_subsets(rule, given)
+        case _:
+            return rule
+
+
+_MOST_SUBSETS = 8
+"""Names of a set up to which a statement with all its subsets, 256, is soon planned."""
+
+
+def names_hash(e: FromClause) -> ColumnElement[int]:
+    """What the index on whole sets of names has of an event."""
+    return _hash(e.c.feature_names)
+
+
+def _hash(texts: ColumnElement[Any]) -> ColumnElement[int]:
+    return func.hash_array(texts, type_=Integer)
+
+
+def _by_subsets(rule: Rule, given: Sequence[str]) -> Rule:
+    """Few sets lie within a small one: each is looked for by itself (docs/adr/0011)."""
+    subsets = [[*chosen] for size in range(len(given) + 1) for chosen in combinations(given, size)]
+    values = (*rule.values, *((subset, TEXTS) for subset in subsets))
+
+    def build(e: FromClause, p: Bind, *within: Bind) -> Condition:
+        # A parameter for each, not all from one sub-select: the planner then knows how many events have them.
+        return and_(rule.build(e, p).is_(true()), names_hash(e) == any_(array([*map(_hash, within)])))
+
+    return indexed((*rule.key, "by sets", len(given)), values, build)
 
 
 def features(cue: FeaturesCue) -> Rule:
