@@ -24,9 +24,8 @@ lint: setup  ## ruff and mypy --strict
 	@.venv/bin/ruff format --check
 	@.venv/bin/mypy
 
-opponents: setup  ## BoboCEP, with which recognition is compared, in an environment of its own
-	@test -x .opponents/bobocep/bin/python || .venv/bin/python -m venv .opponents/bobocep
-	@.opponents/bobocep/bin/python -m pip install -qq --disable-pip-version-check bobocep==1.2.2
+opponents: setup  ## the stores and engines that elm is compared with, each in an environment of its own
+	@scripts/opponents
 
 bench: setup  ## measure inserts, recalls, recognition and type hierarchies; the figures go to out/
 	@mkdir -p out

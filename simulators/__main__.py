@@ -18,6 +18,12 @@ COMMANDS = MappingProxyType(
         ),
         "recall": ("simulators.recalling.recall", "time of each class of cues against the best statement by hand"),
         "recognize": ("simulators.recognizing.recognize", "rates, latency and memory of recognition"),
+        "opponents": ("simulators.opponents.opponents", "the same events and questions in other stores, side by side"),
+        "paper": ("simulators.paper.experiments", "the experiments of the paper's section VI, run again"),
+        "report": ("simulators.report.command", "the figures of all measurements as one document with plots"),
+        "scale": ("simulators.scaling.scale", "growth of commits and recalls with the memory, up to 10^7 events"),
+        "armem": ("simulators.armem.evaluation", "ArmarX-style memory: commits, queries, Ice, ages of data, forgetting"),
+        "household": ("simulators.worlds.household.command", "days in the life of a household, written to files"),
     }
 )
 """The commands: the module of each, with a function `main(argv)`, and what it does."""

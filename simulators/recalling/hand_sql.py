@@ -77,8 +77,18 @@ CONDITIONS = MappingProxyType(
         "features.subset": "e.feature_tokens <@ %(features)s::text[]",
         "features.superset": "e.feature_tokens @> %(features)s::text[]",
         "features.intersects": "e.feature_tokens && %(features)s::text[]",
-        "feature_names.equal": "e.feature_names = %(feature_names)s::text[]",
-        "feature_names.subset": "e.feature_names <@ %(feature_names)s::text[]",
+        "feature_names.equal": """
+            hash_array(e.feature_names) = hash_array(%(feature_names)s::text[])
+            AND (e.feature_names = %(feature_names)s::text[]) IS TRUE
+        """,
+        # Each subset of the names is looked for as a whole; IS TRUE keeps the planner off the inverted index.
+        "feature_names.subset": """
+            hash_array(e.feature_names) = ANY (ARRAY(
+                SELECT hash_array(ARRAY(SELECT n FROM unnest(%(feature_names)s::text[]) WITH ORDINALITY AS u (n, i)
+                                        WHERE number >> (i - 1)::integer & 1 = 1 ORDER BY i))
+                FROM generate_series(0, (1 << cardinality(%(feature_names)s::text[])) - 1) AS s (number)
+            )) AND (e.feature_names <@ %(feature_names)s::text[]) IS TRUE
+        """,
         "feature_names.superset": "e.feature_names @> %(feature_names)s::text[]",
         "feature_names.intersects": "e.feature_names && %(feature_names)s::text[]",
     }

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import gc
 import subprocess
 import sys
 import tracemalloc
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from datetime import timedelta
 from itertools import islice, pairwise
 from statistics import fmean
@@ -27,6 +28,7 @@ from elm.taxonomy import EventType, Taxonomy
 from simulators import __main__ as command_line
 from simulators.worlds import hierarchy, vocabulary
 from simulators.worlds.events import World, simulate
+from simulators.worlds.household import simulate_household
 from simulators.worlds.queries import CLASSES, classes_of, cue_of, simulate_queries
 
 COUNT = 20_000
@@ -217,6 +219,21 @@ def test_events_stream_in_constant_memory() -> None:
     assert late < 1.2 * early
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("stream", [simulate, simulate_household])
+def test_two_hundred_thousand_events_leave_nothing_behind(stream: Callable[[int], Iterator[Event]]) -> None:
+    events = stream(1)
+
+    def held_after(count: int) -> int:
+        for _ in islice(events, count):
+            pass
+        gc.collect()
+        return len(gc.get_objects())
+
+    early, late = held_after(20_000), held_after(180_000)
+    assert late < early + 10_000
+
+
 # Queries
 
 
@@ -254,6 +271,36 @@ def test_several_components_speak_of_different_fields(components: int, stored: l
     for query in islice(simulate_queries(stored, seed=6, components=components), 500):
         assert len({name.partition(".")[0] for name in query.classes}) == len(query.classes) == components
         assert classes_of(query.cue) == query.classes
+
+
+@pytest.mark.parametrize("components", [2, 3])
+def test_each_further_component_is_drawn_with_equal_probability(components: int, stored: list[StoredEvent]) -> None:
+    number = 5_400
+    queries = list(islice(simulate_queries(stored, seed=7, components=components), number))
+    first = Counter(query.classes[0] for query in queries)
+    assert set(first) == set(CLASSES)
+    assert all(abs(count - number / 27) < 4.5 * (number / 27) ** 0.5 for count in first.values())
+    drawn = Counter(name for query in queries for name in query.classes[1:])
+    assert set(drawn) == set(CLASSES)
+    for field in {name.partition(".")[0] for name in CLASSES}:
+        relations = [drawn[name] for name in CLASSES if name.partition(".")[0] == field]
+        fair = sum(relations) / len(relations)
+        assert all(abs(count - fair) < 4.5 * fair**0.5 for count in relations), field
+    sources = Counter(query.source for query in queries)
+    assert len(sources) > 0.9 * len(stored)
+
+
+@pytest.mark.parametrize("components", [2, 3])
+def test_a_cue_of_several_components_recalls_its_source(
+    components: int, store: MemoryStore, stored: list[StoredEvent]
+) -> None:
+    known = {event.uid: event for event in stored}
+    for query in islice(simulate_queries(stored, seed=8, components=components), 60):
+        event = known[query.source]
+        empty = ("parts.intersects" in query.classes and not event.parts) or (
+            "wholes.intersects" in query.classes and not event.wholes
+        )
+        assert (event.id in set(store.ids(Query(cue=query.cue)))) is not empty
 
 
 def test_queries_follow_their_seed_and_a_growing_memory(stored: list[StoredEvent]) -> None:
@@ -309,7 +356,8 @@ def test_other_cues_are_of_no_class(stored: list[StoredEvent]) -> None:
 def test_the_command_line_lists_its_commands(capsys: pytest.CaptureFixture[str]) -> None:
     assert command_line.main(["--help"]) == 0
     shown = capsys.readouterr().out
-    assert all(name in shown for name in ("insert", "recall", "types"))
+    assert {"insert", "recall", "types", "household"} <= command_line.COMMANDS.keys()
+    assert all(f"  {name} " in shown for name in command_line.COMMANDS)
     assert command_line.main(["fly"]) == 2
     assert "usage" in capsys.readouterr().err
 

@@ -1,0 +1,174 @@
+"""SpatiaLite: SQLite with exact polygons in SQL, through apsw, for Python's own sqlite3 often cannot load it.
+
+The tables are those of the SQLite side, and with them the R*Tree of times; the region is a column of
+SpatiaLite with its spatial index, whose R*Tree finds the boxes and whose GEOS functions test the polygons.
+"""
+
+# ruff: noqa: S608 - statements are put together from constants
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from struct import pack
+from types import MappingProxyType
+from typing import Any
+
+import apsw
+
+from simulators.opponents.protocol import Question, Record, Ring, Workload, everything_but, serve
+from simulators.opponents.sides.sqlite_tables import (
+    COLUMNS,
+    DURABILITY,
+    SEARCHES,
+    Found,
+    create,
+    keep,
+    order_of,
+    row_of,
+    settle,
+    values_of,
+)
+
+_EXTENSION = "mod_spatialite"
+_PLACE = (
+    "SELECT InitSpatialMetaDataFull(1)",
+    "CREATE TABLE place (number INTEGER PRIMARY KEY)",
+    "SELECT AddGeometryColumn('place', 'region', -1, 'POLYGON', 'XY', 1)",
+    "SELECT CreateSpatialIndex('place', 'region')",
+)
+_INSERT_PLACE = ("INSERT INTO place VALUES (:number, GeomFromWKB(:region, -1))",)
+_INDEX = "idx_place_region b CROSS JOIN place p ON p.number = b.pkid CROSS JOIN event e ON e.number = b.pkid"
+_MEETING = "b.xmin <= :east AND b.xmax >= :west AND b.ymin <= :north AND b.ymax >= :south"
+_INSIDE = "b.xmin >= :west AND b.xmax <= :east AND b.ymin >= :south AND b.ymax <= :north"
+_AROUND = "b.xmin <= :west AND b.xmax >= :east AND b.ymin <= :south AND b.ymax >= :north"
+_NEAR = "ST_Distance(p.region, MakePoint(:x, :y)) <= :metres"
+_ASKED = "GeomFromWKB(:region, -1)"
+_LATELY = "e.begins <= :end AND e.ends >= :begin"
+_IS_A = (
+    "EXISTS (SELECT 1 FROM is_a i WHERE i.ancestor = (SELECT id FROM type WHERE name = :type)"
+    " AND i.descendant = e.type)"
+)
+_PLACES: Mapping[str, str] = MappingProxyType(
+    {
+        "region.equal": f"{_INDEX} WHERE {_AROUND} AND ST_Equals(p.region, {_ASKED}) = 1",
+        "region.subset": f"{_INDEX} WHERE {_INSIDE} AND CoveredBy(p.region, {_ASKED}) = 1",
+        "region.superset": f"{_INDEX} WHERE {_AROUND} AND Covers(p.region, {_ASKED}) = 1",
+        "region.intersects": f"{_INDEX} WHERE {_MEETING} AND ST_Intersects(p.region, {_ASKED}) = 1",
+        "near": f"{_INDEX} WHERE {_MEETING} AND {_NEAR}",
+        "near.lately": f"{_INDEX} WHERE {_MEETING} AND {_LATELY} AND {_NEAR}",
+        "near.type": f"{_INDEX} WHERE {_MEETING} AND {_IS_A} AND {_NEAR}",
+    }
+)
+_NEAREST = (
+    f"{_INDEX} WHERE {_MEETING} AND {_NEAR} ORDER BY ST_Distance(p.region, MakePoint(:x, :y)), e.number LIMIT :limit"
+)
+_ROUNDING = 1e-3
+"""Metres by which a box of float32 may be wider than its region, at most."""
+_FIRST_RADIUS = 1.0
+
+
+class SpatiaLite:
+    """A file of SpatiaLite, written and asked through apsw."""
+
+    name = "spatialite"
+    title = "SpatiaLite"
+    why = (
+        "SQLite in the user's own process, with exact polygons: no round trip to a server, one writer; its triggers "
+        "check each polygon in SQL."
+    )
+    durability: Mapping[str, str] = DURABILITY
+    abilities = everything_but({}, filtered=("nearest",))
+
+    def __init__(self, workload: Workload, directory: Path, mode: str, dsn: str | None) -> None:
+        self._connection = apsw.Connection(str(directory / "events.spatialite"))
+        self._connection.enable_load_extension(True)
+        self._connection.load_extension(_EXTENSION)
+        create(self._connection, workload, mode)
+        for statement in _PLACE:
+            self._connection.execute(statement).fetchall()
+        settle(self._connection)
+
+    def version(self) -> str:
+        """Those of SpatiaLite, its GEOS, and SQLite."""
+        found = self._connection.execute("SELECT spatialite_version(), geos_version(), sqlite_version()").fetchall()
+        spatialite, geos, sqlite = found[0]
+        return f"{spatialite}, GEOS {geos}, SQLite {sqlite}"
+
+    def commit(self, record: Record) -> object:
+        """One transaction."""
+        self._connection.execute("BEGIN")
+        self._keep(record)
+        return self._connection.execute("COMMIT")
+
+    def load(self, records: Sequence[Record]) -> None:
+        """One transaction for all, statistics for the planner, and a checkpoint."""
+        self._connection.execute("BEGIN")
+        for record in records:
+            self._keep(record)
+        self._connection.execute("COMMIT")
+        settle(self._connection)
+
+    def ask(self, question: Question) -> Sequence[Found]:
+        """Rows as tuples."""
+        values = values_of(question)
+        if question.kind == "nearest":
+            return self._nearest(question, values)
+        if question.kind not in _PLACES:
+            return self._found(f"{SEARCHES[question.kind]}{order_of(question)}", values)
+        return self._found(f"{_PLACES[question.kind]}{order_of(question)}", values | _place(question))
+
+    def uid_of(self, row: Found) -> str:
+        """Its uid."""
+        return row.uid
+
+    def close(self) -> None:
+        """Close the file."""
+        self._connection.close()
+
+    def _keep(self, record: Record) -> None:
+        row = row_of(record)
+        if record.ring is None:
+            keep(self._connection, row, ())
+        else:
+            keep(self._connection, row | {"region": _wkb(record.ring)}, _INSERT_PLACE)
+
+    def _found(self, search: str, values: Mapping[str, Any]) -> list[Found]:
+        region = "p.region" if " place p " in search else "(SELECT region FROM place q WHERE q.number = e.number)"
+        rows = self._connection.execute(f"SELECT {COLUMNS}, ST_AsBinary({region}) FROM {search}", values)
+        return list(map(Found._make, rows))
+
+    def _nearest(self, question: Question, values: Mapping[str, Any]) -> list[Found]:
+        """Boxes around the point, each twice as large as the one before, until enough regions are that near."""
+        x, y = question.value["x"], question.value["y"]
+        ((everything,),) = self._connection.execute("SELECT count(*) FROM place").fetchall()
+        radius = _FIRST_RADIUS
+        while True:
+            found = self._found(_NEAREST, {**values, **_around(x, y, radius)})
+            if len(found) >= min(question.limit or everything, everything):
+                return found
+            radius *= 2
+
+
+def _place(question: Question) -> dict[str, Any]:
+    asked = question.value
+    if question.kind.startswith("near"):
+        return _around(asked["x"], asked["y"], asked["metres"])
+    xs, ys = [x for x, _ in asked], [y for _, y in asked]
+    wider = _ROUNDING if question.kind == "region.subset" else 0.0
+    box = {"west": min(xs) - wider, "south": min(ys) - wider, "east": max(xs) + wider, "north": max(ys) + wider}
+    return {**box, "region": _wkb(asked)}
+
+
+def _around(x: float, y: float, metres: float) -> dict[str, float]:
+    box = {"west": x - metres, "east": x + metres, "south": y - metres, "north": y + metres}
+    return {**box, "x": x, "y": y, "metres": metres}
+
+
+def _wkb(ring: Ring | Sequence[Sequence[float]]) -> bytes:
+    """A polygon with this exterior ring as well-known binary, little-endian."""
+    return pack(f"<BIII{2 * len(ring)}d", 1, 3, 1, len(ring), *(number for corner in ring for number in corner))
+
+
+if __name__ == "__main__":
+    serve(SpatiaLite)
