@@ -1,0 +1,1 @@
+"""Measurements of ArmarX-style memory: what the evaluation of its authors measured, done again here."""

@@ -1,0 +1,1 @@
+"""Tests of ARON: data objects, type objects, their codecs and conversions."""

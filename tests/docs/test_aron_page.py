@@ -1,0 +1,59 @@
+"""docs/aron.md is true: its Python runs as it stands, its JSON goes there and back, its tables list all kinds."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from armem_bridge.aron import data, textual, type_objects
+
+PAGE = (Path(__file__).resolve().parents[2] / "docs" / "aron.md").read_text(encoding="utf-8")
+SECTIONS = {part.partition("\n")[0]: part for part in re.split(r"^## ", PAGE, flags=re.MULTILINE)[1:]}
+
+
+def blocks(text: str, language: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```$", text, flags=re.MULTILINE | re.DOTALL)
+
+
+DOCUMENTS = [line for block in blocks(PAGE, "json") for line in block.splitlines()]
+
+
+def test_the_python_of_the_page_runs() -> None:
+    scope: dict[str, object] = {}
+    found = blocks(PAGE, "python")
+    assert len(found) >= 8
+    for block in found:
+        exec(compile(block, "docs/aron.md", "exec"), scope)  # noqa: S102 - the page is ours
+
+
+@pytest.mark.parametrize("line", DOCUMENTS)
+def test_the_json_of_the_page_goes_there_and_back(line: str) -> None:
+    written = (
+        textual.encode_type(textual.decode_type(line))
+        if "type" in json.loads(line)
+        else textual.encode(textual.decode(line))
+    )
+    assert json.loads(written) == json.loads(line)
+
+
+def test_every_kind_of_data_has_an_example() -> None:
+    shown = "".join(DOCUMENTS)
+    for kind in data.KINDS:
+        assert f'{{"{kind.__name__.lower()}": ' in shown, kind
+
+
+@pytest.mark.parametrize(("section", "module"), [("Data objects", data), ("Type objects", type_objects)])
+def test_the_tables_list_every_kind(section: str, module: object) -> None:
+    rows = "".join(line for line in SECTIONS[section].splitlines() if line.startswith("|"))
+    named = set(re.findall(r"`(\w+)(?:\([\w, ]*\))?`", rows))
+    kinds = data.KINDS if module is data else type_objects.KINDS
+    assert {kind.__name__ for kind in kinds} <= named
+
+
+def test_the_binary_form_has_every_kind() -> None:
+    rows = [line.split("|")[1] for line in SECTIONS["Binary form"].splitlines() if line.startswith("| ")]
+    named = {name.strip() for row in rows for name in row.split(",")}
+    assert {kind.__name__ for kind in data.KINDS} <= named
