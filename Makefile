@@ -1,7 +1,7 @@
 # `make demo` and `make test` do all set-up themselves: see scripts/setup.
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-slow lint opponents bench clean
+.PHONY: help setup demo test test-slow lint opponents bench paper report clean
 
 help:  ## show these targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -9,9 +9,10 @@ help:  ## show these targets
 setup:  ## .venv with the development tools, PostgreSQL with PostGIS from the system's packages
 	@scripts/setup
 
-demo: setup  ## fill a memory with half an hour of a real robot's life and ask it questions
+demo: setup  ## fill a memory with half an hour of a real robot's life and ask it questions; then ArmarX's memory
 	@mkdir -p out
 	@.venv/bin/elm demo --picture out/plaza.png
+	@.venv/bin/elm armem demo
 
 test: setup  ## all tests but the slow ones; in containers too where a Docker engine is at hand
 	@$$ELM_DOCKER_WRAPPER .venv/bin/python -m pytest -m "not slow" --numprocesses auto --maxprocesses 4 --dist loadfile
@@ -27,12 +28,21 @@ lint: setup  ## ruff and mypy --strict
 opponents: setup  ## the stores and engines that elm is compared with, each in an environment of its own
 	@scripts/opponents
 
-bench: setup  ## measure inserts, recalls, recognition and type hierarchies; the figures go to out/
+bench: setup  ## measure inserts, recalls, recognition, type hierarchies and growth; the figures go to out/
 	@mkdir -p out
 	.venv/bin/python -m simulators insert --json out/insert.json
 	.venv/bin/python -m simulators recall --json out/recall.json
 	.venv/bin/python -m simulators recognize --json out/recognize.json
 	.venv/bin/python -m simulators types --json out/types.json
+	.venv/bin/python -m simulators scale --json out/scale.json
+	.venv/bin/python -m simulators report
+
+paper: setup  ## the paper's experiments, ten runs each: three hours; goes on where it was stopped
+	@mkdir -p out
+	.venv/bin/python -m simulators paper --json out/paper.json
+
+report: setup  ## out/report/report.md, with plots, of all figures in out/
+	.venv/bin/python -m simulators report
 
 clean:  ## remove what these targets made in the checkout
 	rm -rf .venv .opponents .mypy_cache .ruff_cache .pytest_cache .hypothesis build dist out

@@ -22,7 +22,10 @@ COMMANDS = MappingProxyType(
         "paper": ("simulators.paper.experiments", "the experiments of the paper's section VI, run again"),
         "report": ("simulators.report.command", "the figures of all measurements as one document with plots"),
         "scale": ("simulators.scaling.scale", "growth of commits and recalls with the memory, up to 10^7 events"),
-        "armem": ("simulators.armem.evaluation", "ArmarX-style memory: commits, queries, Ice, ages of data, forgetting"),
+        "armem": (
+            "simulators.armem.evaluation",
+            "ArmarX-style memory: commits, queries, Ice, ages of data, forgetting",
+        ),
         "household": ("simulators.worlds.household.command", "days in the life of a household, written to files"),
     }
 )

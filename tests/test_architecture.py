@@ -42,11 +42,12 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("armem_bridge.working",),
     ("armem_bridge.names", "armem_bridge.forgetting"),
     ("armem_bridge.long_term",),
-    ("armem_bridge.forgetting_gate", "armem_bridge.long_term_forgetting", "armem_bridge.profiles"),
+    ("armem_bridge.forgetting_gate",),
+    ("armem_bridge.long_term_forgetting", "armem_bridge.profiles", "armem_bridge.ice"),
     ("armem_bridge.config",),
     ("armem_bridge.service",),
     ("armem_bridge",),
-    ("armem_bridge.ice", "armem_bridge.demo"),
+    ("armem_bridge.demo",),
     ("armem_bridge.cli",),
 )
 """Rooms from the inside out. A room imports from rooms before its own, and a package from itself."""

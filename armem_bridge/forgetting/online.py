@@ -80,6 +80,11 @@ class OnlineForgetting:
         self._compared = max((each.count for each in self.mechanisms if isinstance(each, Similarity)), default=0)
         self._entities: dict[MemoryID, _Consolidated] = {}
 
+    @property
+    def remembers(self) -> int:
+        """How many of an entity's last consolidated snapshots its decisions look at."""
+        return max(self._compared, 1 if any(isinstance(each, Frequency) for each in self.mechanisms) else 0)
+
     def decide(self, candidate: Candidate, now: int) -> Decision:
         """Whether the candidate is consolidated; `now` is in microseconds, by the clock that its uses were noted by."""
         known = self._entities.get(candidate.entity, _Consolidated())

@@ -8,6 +8,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Final, Self
 
+from armem_bridge.aron.type_objects import TypeObject
 from armem_bridge.memory_id import MemoryID
 from armem_bridge.moments import Clock, now
 from armem_bridge.working.access_statistics import Usage
@@ -146,6 +147,10 @@ class MemoryServer:
         if wanted.timestamp >= 0:
             return history.at(wanted.timestamp)
         return next(iter(history.latest(1)), None)
+
+    def segment_type(self, segment: MemoryID) -> TypeObject | None:
+        """The type of a core or provider segment; None where it has none, or is not there."""
+        return self._memory.segment_type(segment)
 
     def usage(self, snapshot: MemoryID) -> Usage:
         """How often and when last queries returned a snapshot that is in working memory."""

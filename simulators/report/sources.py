@@ -69,6 +69,7 @@ SOURCES = (
         function="hierarchy_section",
         first="ELM_TEST_DATA=DIR ",
     ),
+    Source(name="armem", title="ArmarX-style memory", module="simulators.armem.drawn"),
 )
 """In the order of the report."""
 

@@ -227,3 +227,13 @@ def test_the_published_threshold_of_time_decay_is_refused() -> None:
 def test_thresholds_that_cannot_be(make: Any) -> None:
     with pytest.raises(InvalidMechanism):
         make()
+
+
+def test_it_says_how_much_it_must_be_told_after_a_restart() -> None:
+    decay = TimeDecay(activation=Exponential(tau=10.0), minimum=0.5)
+    similar = Similarity(distance="mse", minimum=1.0, count=20)
+
+    assert OnlineForgetting().remembers == 0
+    assert OnlineForgetting([decay]).remembers == 0
+    assert OnlineForgetting([Frequency(wait=1.0)]).remembers == 1
+    assert OnlineForgetting([decay, Frequency(wait=1.0), similar]).remembers == 20

@@ -1,0 +1,80 @@
+"""The names in long-term memory, remembered: to group all snapshots by name at each question takes too long."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable
+from threading import Lock
+from typing import Final
+
+from armem_bridge.long_term.mapping import ID, below
+from armem_bridge.memory_id import MemoryID
+from elm.app import Memory
+from elm.errors import MemoryMissing
+from elm.store import ByFeature
+
+MAX_AGE: Final = 300.0
+"""After so many seconds the names are looked up again, for other processes may have written some."""
+
+
+def names_below(parent: MemoryID, entities: Iterable[MemoryID]) -> list[str]:
+    """The names one level below a memory, core segment or provider segment that these entities have, in order."""
+    return sorted({entity.names[parent.level] for entity in entities if parent.contains(entity)})
+
+
+class Catalogue:
+    """The entities that an elm memory has snapshots of; any thread may ask.
+
+    It is told what this process writes, and looks everything up again after a forgetting. Of what other
+    processes write it learns after `max_age` seconds.
+    """
+
+    def __init__(
+        self, memory: Memory, *, max_age: float = MAX_AGE, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._memory = memory
+        self._max_age = max_age
+        self._clock = clock
+        self._lock = Lock()
+        self._looking_up = Lock()
+        self._entities: set[MemoryID] = set()
+        self._written: set[MemoryID] = set()
+        self._known_at: float | None = None
+        self._forgotten: tuple[int, int] = (0, 0)
+
+    def add(self, entities: Iterable[MemoryID]) -> None:
+        """There are snapshots of these now."""
+        with self._lock:
+            for entity in entities:
+                self._entities.add(entity)
+                self._written.add(entity)
+
+    def entities(self) -> list[MemoryID]:
+        """All entities."""
+        with self._looking_up:
+            forgotten = self._forgotten_so_far()
+            moment = self._clock()
+            if self._known_at is None or moment - self._known_at >= self._max_age or forgotten != self._forgotten:
+                with self._lock:
+                    self._written.clear()
+                found = self._looked_up()
+                with self._lock:
+                    self._entities = found | self._written
+                self._known_at, self._forgotten = moment, forgotten
+        with self._lock:
+            return list(self._entities)
+
+    def _looked_up(self) -> set[MemoryID]:
+        try:
+            groups = self._memory.recall(below(MemoryID())).groups(ByFeature(name=ID))
+        except MemoryMissing:
+            return set()
+        return {MemoryID.parse(group.key) for group in groups if isinstance(group.key, str)}
+
+    def _forgotten_so_far(self) -> tuple[int, int]:
+        """What changes with every forgetting: how many there were, and of how many events."""
+        try:
+            runs = list(self._memory.store.run_tombstones())
+        except MemoryMissing:
+            return (0, 0)
+        return len(runs), sum(run.events for run in runs)

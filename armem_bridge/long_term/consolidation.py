@@ -1,0 +1,290 @@
+"""Long-term memory behind memory servers: the archive that consolidates snapshots into elm (section 4.5.1)."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from threading import Lock, Thread
+from types import TracebackType
+from typing import Final, Self
+
+from armem_bridge.aron.type_objects import TypeObject
+from armem_bridge.long_term.backlog import Backlog, Waiting
+from armem_bridge.long_term.catalogue import Catalogue
+from armem_bridge.long_term.event_types import SegmentTypes, types_of
+from armem_bridge.long_term.gate import Gate, OpenGate, RememberingGate
+from armem_bridge.long_term.health import Health
+from armem_bridge.long_term.refusals import ArchiveClosed, NotConsolidated
+from armem_bridge.long_term.robot_place import LocationPort
+from armem_bridge.long_term.settings import Consolidation, When
+from armem_bridge.long_term.source import LongTermSource
+from armem_bridge.long_term.subjects import SubjectFinder
+from armem_bridge.long_term.writing import UNAVAILABLE, EventWriter, SetAside
+from armem_bridge.memory_id import Level
+from armem_bridge.moments import Clock, now
+from armem_bridge.working.access_statistics import Usage
+from armem_bridge.working.archive import Evicted
+from armem_bridge.working.history import Source
+from armem_bridge.working.server import MemoryServer
+from armem_bridge.working.snapshot import Snapshot
+from armem_bridge.working.union import UnionSource
+from elm.app import Memory
+from elm.errors import StoreFailure
+from elm.text import check_short_name
+
+SHOWN: Final = 100
+"""So many of the snapshots that were set aside are kept to be looked at."""
+
+GLANCE: Final = 0.02
+"""So many seconds pass between two looks at snapshots that wait for poses of the robot."""
+
+STOP_TIMEOUT: Final = 30.0
+"""So many seconds `close` waits for what still waits to be consolidated, unless told otherwise."""
+
+_logger = logging.getLogger(__name__)
+
+
+class LongTermMemory:
+    """An `Archive` over one elm memory, for as many memory servers as there are.
+
+    With the usual settings a commit is acknowledged when it waits in the backlog, which a thread empties
+    into elm in batches; then it is durable. `agent` is the robot, `location` says where it was, `subjects`
+    where the things are that the data are about; `gate` decides what is kept of what leaves working memory,
+    where only that is consolidated. `on_set_aside` is told of every snapshot that cannot be kept.
+
+    Tell it which servers it is behind (`serve`), and `close` it after them: that empties the backlog.
+    """
+
+    def __init__(
+        self,
+        memory: Memory,
+        settings: Consolidation | None = None,
+        *,
+        agent: str | None = None,
+        location: LocationPort | None = None,
+        subjects: SubjectFinder | None = None,
+        gate: Gate | None = None,
+        on_set_aside: Callable[[SetAside], None] | None = None,
+        clock: Clock = now,
+    ) -> None:
+        self.memory = memory
+        self.settings = settings if settings is not None else Consolidation()
+        self._location = location
+        self._gate = RememberingGate(gate if gate is not None else OpenGate())
+        self._on_set_aside = on_set_aside
+        self._clock = clock
+        self._types: dict[str, SegmentTypes] = {}
+        self._catalogue = Catalogue(memory)
+        if agent is not None:
+            check_short_name(agent, what="the agent of a long-term memory, which is the robot,")
+        self._writer = EventWriter(memory, self._catalogue, agent=agent, location=location, subjects=subjects)
+        self._backlog = Backlog(self.settings.backlog, self.settings.backlog_bytes)
+        self._lock = Lock()
+        self._aside: deque[SetAside] = deque(maxlen=SHOWN)
+        self._set_aside = self._forgotten = 0
+        self._health = Health(memory.name)
+        self._hurry = 0
+        self._closed = False
+        self._stopped = False
+        self._thread = Thread(target=self._work, name=f"armem-consolidation-{memory.name}", daemon=True)
+        self._thread.start()
+
+    def serve(self, server: MemoryServer) -> None:
+        """Ask this server for the types of its segments, which its snapshots have in elm too."""
+        self._types[server.name] = types_of(server)
+
+    # The port `Archive`
+
+    def consolidate(self, snapshots: Sequence[Snapshot]) -> None:
+        """Take every version that a commit brought.
+
+        `BacklogFull` after `wait` seconds without room. Durable ones are in elm when this returns;
+        `NotConsolidated` where that cannot be had in time, and other errors where one of them cannot be kept.
+        """
+        self._check_open()
+        if self.settings.when is When.ON_EVICTION:
+            self._backlog.wait_for_room(len(snapshots), self.settings.wait, self._health.why_slow)
+        elif self.settings.durable:
+            self._write_through([(snapshot, self._type_of(snapshot)) for snapshot in snapshots])
+        else:
+            moment = self._clock()
+            waiting = [
+                Waiting(snapshot=snapshot, aron_type=self._type_of(snapshot), moment=moment) for snapshot in snapshots
+            ]
+            self._backlog.wait_for_room(len(waiting), self.settings.wait, self._health.why_slow)
+            self._backlog.put(waiting)
+
+    def on_eviction(self, evicted: Sequence[Evicted]) -> None:
+        """Take what leaves working memory, where that is what is consolidated; written through it is here already."""
+        if self.settings.when is When.ON_EVICTION:
+            self._check_open()
+            moment = self._clock()
+            self._backlog.put(
+                [Waiting(snapshot=each.snapshot, aron_type=None, evicted=each.usage, moment=moment) for each in evicted]
+            )
+
+    def source(self, memory: str) -> Source | None:
+        """The long-term memory of that name, what still waits included."""
+        return UnionSource(self._backlog.source(), LongTermSource(self.memory, self._catalogue))
+
+    def status(self) -> Mapping[str, object]:
+        """What waits, what was consolidated, what was set aside and why, and how the database is."""
+        oldest = self._backlog.oldest()
+        with self._lock:
+            return {
+                "elm_memory": self.memory.name,
+                "when": str(self.settings.when),
+                "durable": self.settings.durable,
+                "backlog": len(self._backlog),
+                "backlog_limit": self._backlog.limit,
+                "backlog_bytes": self._backlog.bytes,
+                "backlog_seconds": 0.0 if oldest is None else time.monotonic() - oldest.since,
+                **self._writer.status(),
+                "forgotten": self._forgotten,
+                "set_aside": self._set_aside,
+                "last_set_aside": [str(each) for each in self._aside][-10:],
+                **self._health.status(),
+            }
+
+    # Looking after it
+
+    @property
+    def set_aside(self) -> tuple[SetAside, ...]:
+        """The last snapshots that could not be kept, with the reasons."""
+        with self._lock:
+            return tuple(self._aside)
+
+    def flush(self, timeout: float | None = None) -> bool:
+        """Wait until what waits now is durable, forgotten or set aside; whether that was within `timeout` seconds."""
+        last = self._backlog.last
+        self._hurry = max(self._hurry, last)
+        self._backlog.wake()
+        return self._backlog.wait_until_done(last, timeout)
+
+    def close(self, timeout: float = STOP_TIMEOUT) -> None:
+        """Take nothing more, make durable what waits, and stop; closing again changes nothing.
+
+        `NotConsolidated` where that takes longer than `timeout` seconds: it is tried on until the process
+        ends, and what waits then is lost to long-term memory. Closing can be tried again meanwhile.
+        """
+        self._closed = True
+        if not self.flush(timeout):
+            raise NotConsolidated(
+                f"{len(self._backlog):,} snapshots are not durable after {timeout:g} s ({self._health.why_slow()}): "
+                f"they are lost if this process ends now. Look after the database and close again"
+            )
+        self._stopped = True
+        self._backlog.wake()
+        self._thread.join()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    # Inside
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise ArchiveClosed(f"the long-term memory {self.memory.name!r:.80} was closed: make a new one")
+
+    def _type_of(self, snapshot: Snapshot) -> TypeObject | None:
+        find = self._types.get(snapshot.id.memory)
+        return find(snapshot.id.cut(Level.PROVIDER_SEGMENT)) if find is not None else None
+
+    def _write_through(self, given: Sequence[tuple[Snapshot, TypeObject | None]]) -> None:
+        deadline = time.monotonic() + self.settings.wait
+        pause = self.settings.least_pause
+        while True:
+            try:
+                self._writer.write_all(given)
+                self._health.worked()
+                return
+            except (*UNAVAILABLE, StoreFailure) as error:
+                self._health.failed(error)
+                if time.monotonic() + pause > deadline:
+                    raise NotConsolidated(
+                        f"{len(given)} snapshots could not be made durable within {self.settings.wait:g} s: {error}"
+                    ) from error
+            time.sleep(pause)
+            pause = min(2 * pause, self.settings.most_pause)
+
+    # The thread that empties the backlog
+
+    def _work(self) -> None:
+        pause = self.settings.least_pause
+        while not self._stopped:
+            batch = self._backlog.take(self.settings.batch, self._is_ready, timeout=1.0)
+            if not batch:
+                time.sleep(GLANCE if len(self._backlog) else 0.0)
+                continue
+            try:
+                self._consolidate(batch)
+            except Exception as error:
+                self._health.failed(error)
+                self._sleep(pause)
+                pause = min(2 * pause, self.settings.most_pause)
+            else:
+                self._health.worked()
+                pause = self.settings.least_pause
+
+    def _consolidate(self, batch: Sequence[Waiting]) -> None:
+        self._writer.write(self._let_through(batch), done=self._backlog.done, aside=self._lay_aside)
+
+    def _let_through(self, batch: Sequence[Waiting]) -> list[Waiting]:
+        """What is to be kept of a batch: all that was committed, and of what was evicted what the gate keeps."""
+        kept: list[Waiting] = []
+        for waiting in batch:
+            if waiting.evicted is not None:
+                if not self._keeps(waiting, waiting.evicted):
+                    with self._lock:
+                        self._forgotten += 1
+                    self._backlog.done([waiting])
+                    continue
+                # Decided once: the gate is not asked again when the database has to be.
+                waiting.evicted = None
+                waiting.aron_type = self._type_of(waiting.snapshot)
+            kept.append(waiting)
+        return kept
+
+    def _keeps(self, waiting: Waiting, usage: Usage) -> bool:
+        """What the gate says; where it fails itself, nothing is forgotten on that account."""
+        evicted = Evicted(snapshot=waiting.snapshot, usage=usage)
+        try:
+            return self._gate.keeps(evicted, waiting.moment, LongTermSource(self.memory))
+        except (*UNAVAILABLE, StoreFailure):
+            raise
+        except Exception as error:
+            _logger.exception("online forgetting failed on %s, which is consolidated", waiting.snapshot.id)
+            self._health.stumbled(error)
+            return True
+
+    def _is_ready(self, waiting: Waiting) -> bool:
+        """Whether a snapshot need not wait for poses of the robot any longer."""
+        return (
+            self._location is None
+            or waiting.number <= self._hurry
+            or self._backlog.is_half_full
+            or time.monotonic() - waiting.since >= self.settings.patience
+        )
+
+    def _sleep(self, pause: float) -> None:
+        until = time.monotonic() + pause
+        while not self._stopped and time.monotonic() < until:
+            time.sleep(min(0.05, pause))
+
+    def _lay_aside(self, what: SetAside) -> None:
+        _logger.error("a snapshot cannot be consolidated, and is only in working memory: %s", what)
+        with self._lock:
+            self._set_aside += 1
+            self._aside.append(what)
+        if self._on_set_aside is not None:
+            try:
+                self._on_set_aside(what)
+            except Exception:
+                _logger.exception("what is told of snapshots that are set aside failed itself")

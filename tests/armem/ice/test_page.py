@@ -1,0 +1,43 @@
+"""docs/armem_ice.md is true: what it imports is there, and its numbers are those of the code."""
+
+from __future__ import annotations
+
+import ast
+import re
+from importlib import import_module
+
+import pytest
+
+from armem_bridge.aron.data import DEPTH_LIMIT
+from armem_bridge.ice.communicators import MESSAGE_KILOBYTES, PROPERTIES
+from armem_bridge.ice.edge import NAME_SYSTEM, EdgeStatus, topic_of
+from armem_bridge.ice.standalone import PORT
+from armem_bridge.ice.wire.aron import ELEMENTS_LIMIT
+from tests.armem.ice.processes import ROOT
+
+PAGE = (ROOT / "docs" / "armem_ice.md").read_text(encoding="utf-8")
+BLOCKS = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+
+
+@pytest.mark.parametrize("block", BLOCKS, ids=range(len(BLOCKS)))
+def test_what_the_examples_import_is_there(block: str) -> None:
+    imports = [node for node in ast.walk(ast.parse(block)) if isinstance(node, ast.ImportFrom)]
+
+    assert imports
+    for node in imports:
+        assert node.module is not None
+        for alias in node.names:
+            assert hasattr(import_module(node.module), alias.name)
+
+
+def test_its_numbers_are_those_of_the_code() -> None:
+    assert MESSAGE_KILOBYTES == 1024 * 1024
+    assert "up to 1 GiB" in PAGE
+    assert f"up to {PROPERTIES['Ice.ThreadPool.Server.SizeMax']} threads" in PAGE
+    assert f"more than {DEPTH_LIMIT} levels" in PAGE
+    assert ELEMENTS_LIMIT == 1_000_000
+    assert "or a million elements" in PAGE
+    assert f"-p {PORT}" in PAGE
+    assert NAME_SYSTEM in PAGE
+    assert topic_of("<memory>") in PAGE
+    assert {"untimed", "versions"} <= set(EdgeStatus.__struct_fields__)

@@ -1,0 +1,98 @@
+"""Names in long-term memory are remembered, and right all the same: after writing, forgetting and others' writing."""
+
+from __future__ import annotations
+
+from armem_bridge.long_term import Consolidation, LongTermMemory, arrival_of
+from armem_bridge.long_term.catalogue import Catalogue
+from armem_bridge.long_term.mapping import below
+from armem_bridge.memory_id import MemoryID
+from armem_bridge.working import Snapshot
+from elm.app import Memory
+from elm.cues.algebra import Cue
+from elm.storage.memory import MemoryStore
+from elm.store import ByFeature, Group, Grouping
+from tests.armem.long_term.memories import QUICK, behind
+from tests.armem.working.scenes import CUP, commit, snapshot, update
+from tests.conftest import StoreFactory
+
+MUG = CUP.with_entity("mug")
+SEGMENT = CUP.cut(CUP.level).with_entity("")
+
+
+class Counting(MemoryStore):
+    """A store that counts how often all events are grouped."""
+
+    groupings = 0
+
+    def groups(self, cue: Cue, by: Grouping | ByFeature) -> list[Group]:
+        self.groupings += 1
+        return super().groups(cue, by)
+
+
+def keep(memory: Memory, *given: Snapshot) -> None:
+    """Write snapshots as another process would."""
+    memory.add_type("Seen")
+    assert memory.store.load([arrival_of(each, event_type="Seen") for each in given]).refused == ()
+
+
+def test_names_are_looked_up_once_and_again_after_a_forgetting() -> None:
+    store = Counting()
+    memory = Memory(store)
+    keep(memory, snapshot(1))
+    catalogue = Catalogue(memory)
+    assert catalogue.entities() == [CUP]
+    catalogue.add([MUG])
+    keep(memory, snapshot(2, entity=MUG))
+    assert sorted(catalogue.entities()) == [CUP, MUG]
+    assert store.groupings == 1
+
+    memory.forget(below(CUP))
+    assert catalogue.entities() == [MUG]
+    assert store.groupings == 2
+    memory.forget(below(MUG))
+    assert catalogue.entities() == []
+
+
+def test_what_others_write_is_found_after_a_while() -> None:
+    moment = 0.0
+    memory = Memory(MemoryStore())
+    catalogue = Catalogue(memory, max_age=10, clock=lambda: moment)
+    assert catalogue.entities() == []
+    keep(memory, snapshot(1))
+    assert catalogue.entities() == []
+    moment = 10.0
+    assert catalogue.entities() == [CUP]
+
+
+def test_what_is_written_during_a_look_is_not_lost() -> None:
+    class Slow(MemoryStore):
+        def groups(self, cue: Cue, by: Grouping | ByFeature) -> list[Group]:
+            found = super().groups(cue, by)
+            catalogue.add([MUG])
+            return found
+
+    memory = Memory(Slow())
+    keep(memory, snapshot(1))
+    catalogue = Catalogue(memory)
+    assert sorted(catalogue.entities()) == [CUP, MUG]
+
+
+def test_names_in_every_store(store_factory: StoreFactory) -> None:
+    memory = Memory(store_factory())
+    for settings in (QUICK, Consolidation(durable=True)):
+        archive = LongTermMemory(memory, settings)
+        source = archive.source("Object")
+        assert source is not None
+        with behind(archive) as server:
+            source.names(SEGMENT)
+            commit(server, update(1), update(2, entity=MUG), update(3, entity=CUP.with_provider_segment("x/y")
+                .with_entity("a%b")))  # fmt: skip
+            archive.flush(timeout=30)
+            assert source.names(SEGMENT) == ["blue-cup", "mug"]
+            assert source.names(MemoryID(memory="Object", core_segment="Instance")) == ["ObjectLocalizer", "x/y"]
+            assert source.names(MemoryID(memory="Object")) == ["Instance"]
+            assert source.names(MemoryID(memory="Grasp")) == []
+            memory.forget(below(MUG))
+            assert source.names(SEGMENT) == ["blue-cup"]
+            assert source.knows(CUP)
+            assert not source.knows(MUG)

@@ -1,0 +1,367 @@
+"""What is committed becomes durable: at once or soon, once each, whatever the database does meanwhile."""
+
+from __future__ import annotations
+
+import logging
+import time
+from threading import Thread
+
+import pytest
+
+from armem_bridge.aron import type_objects as t
+from armem_bridge.long_term import Consolidation, LongTermMemory, When
+from armem_bridge.long_term.refusals import ArchiveClosed, BacklogFull, InvalidArchive, NotConsolidated
+from armem_bridge.long_term.source import LongTermSource
+from armem_bridge.long_term.writing import SetAside
+from armem_bridge.memory_id import MemoryID
+from armem_bridge.moments import GREATEST
+from armem_bridge.working import AddSegment, Commit, CommitResult, Evicted
+from armem_bridge.working.access_statistics import UNUSED, Usage
+from armem_bridge.working.query import AllSnapshots
+from elm import cues
+from elm.app import Memory
+from elm.errors import DatabaseUnfit, DatabaseUnreachable, InvalidValue, StoreFailure
+from elm.geometry import Region
+from tests.armem.long_term.memories import QUICK, FailingStore, behind, in_process
+from tests.armem.long_term.test_source import HeldStore
+from tests.armem.working.oracle import about_the_cup
+from tests.armem.working.scenes import CUP, MEMORY, commit, moments, snapshot, update
+from tests.conftest import StoreFactory
+
+MUG = CUP.with_entity("mug")
+DURABLE = Consolidation(durable=True, wait=0.1, least_pause=0.001)
+EVICTED = Consolidation(when=When.ON_EVICTION, wait=0.1, least_pause=0.001)
+
+
+def kept(memory: Memory, entity: MemoryID = CUP) -> list[int]:
+    """The reference times of the cup in elm."""
+    return [each.referenced for each in LongTermSource(memory).history(entity).all()]
+
+
+def test_commits_are_durable_when_flushed(store_factory: StoreFactory) -> None:
+    memory = Memory(store_factory())
+    archive = LongTermMemory(memory, QUICK, agent="armar7")
+    with behind(archive) as server:
+        commit(server, update(20), update(10))
+        commit(server, update(20))
+        assert archive.flush(timeout=30)
+        assert kept(memory) == [10, 20]
+        status = server.status().archive
+    assert (status["backlog"], status["consolidated"], status["repeated"], status["set_aside"]) == (0, 2, 1, 0)
+    assert memory.recall(cues.agent("armar7")).count() == 2
+
+
+def test_closing_makes_durable_what_waits() -> None:
+    store = HeldStore()
+    archive = LongTermMemory(Memory(store), QUICK)
+    with behind(archive) as server:
+        for moment in range(50):
+            commit(server, update(moment))
+        assert archive.status()["backlog"] == 50
+        assert not archive.flush(timeout=0.01)
+        store.go.set()
+    assert kept(archive.memory) == list(range(50))
+    archive.close()
+    with pytest.raises(ArchiveClosed, match="was closed: make a new one"):
+        archive.consolidate([snapshot(1)])
+
+
+def test_durable_commits_are_in_elm_when_they_are_acknowledged(store_factory: StoreFactory) -> None:
+    memory = Memory(store_factory())
+    with behind(LongTermMemory(memory, Consolidation(durable=True))) as server:
+        for moment in (10, 20, 20):
+            commit(server, update(moment), update(moment, entity=MUG))
+            assert kept(memory)[-1] == kept(memory, MUG)[-1] == moment
+    assert memory.recall().count() == 4
+
+
+def test_durable_commits_are_kept_whole_or_refused() -> None:
+    store = FailingStore()
+    memory = Memory(store)
+    with behind(LongTermMemory(memory, DURABLE)) as server:
+        result = server.commit(Commit(updates=[update(10), update(GREATEST)]))
+        assert not any(each.success for each in result.results)
+        assert "is beyond the year 9999" in result.errors[0]
+        store.errors = [DatabaseUnreachable("the plug was pulled")] * 1000
+        result = server.commit(Commit(updates=[update(10)]))
+        assert "could not be made durable within 0.1 s: the plug was pulled" in result.errors[0]
+        store.errors = [DatabaseUnreachable("for a moment")] * 3
+        commit(server, update(10))
+    assert kept(memory) == [10]
+
+
+def test_what_was_written_before_the_connection_broke_is_there_once() -> None:
+    for settings in (DURABLE, QUICK):
+        store = FailingStore()
+        store.after = True
+        store.errors = [DatabaseUnreachable("gone before it answered")] * 2
+        archive = LongTermMemory(Memory(store), settings)
+        with behind(archive) as server:
+            commit(server, update(10), update(20))
+        assert kept(archive.memory) == [10, 20]
+        assert archive.memory.recall().count() == 2
+        assert archive.status()["failures"] == 2
+
+
+def test_the_database_may_be_away_for_a_while(caplog: pytest.LogCaptureFixture) -> None:
+    store = FailingStore()
+    store.errors = [DatabaseUnreachable("no route"), DatabaseUnfit("no room"), StoreFailure("cancelled")]
+    archive = LongTermMemory(Memory(store), QUICK)
+    with caplog.at_level(logging.WARNING), behind(archive) as server:
+        commit(server, update(10))
+        assert archive.flush(timeout=30)
+        commit(server, update(20))
+    assert kept(archive.memory) == [10, 20]
+    status = archive.status()
+    assert (status["failures"], status["failing_seconds"], status["set_aside"]) == (3, 0.0, 0)
+    assert status["last_error"] == "DatabaseUnreachable: no route"
+    said = [each.getMessage() for each in caplog.records]
+    assert said == [
+        "consolidation into 'elm' fails, and is tried again: cancelled",
+        "consolidation into 'elm' works again",
+    ]
+
+
+def test_a_full_backlog_holds_commits_back_and_then_refuses_them() -> None:
+    store = FailingStore()
+    store.errors = [DatabaseUnreachable("no route")] * 100_000
+    archive = LongTermMemory(Memory(store), Consolidation(backlog=3, wait=0.05, least_pause=0.001, most_pause=0.01))
+    with behind(archive) as server:
+        for moment in (1, 2, 3):
+            commit(server, update(moment))
+        result = server.commit(Commit(updates=[update(4)]))
+        assert not result.success
+        assert "3 snapshots with" in result.errors[0]
+        assert "DatabaseUnreachable: no route" in result.errors[0]
+        assert server.get(CUP.with_timestamp(4)) is None
+        status = archive.status()
+        assert (status["backlog"], status["backlog_limit"]) == (3, 3)
+        assert status["failing_seconds"] != 0.0
+        with pytest.raises(NotConsolidated, match="3 snapshots are not durable"):
+            archive.close(timeout=0.05)
+        store.errors.clear()
+        archive.close(timeout=30)
+    assert kept(archive.memory) == [1, 2, 3]
+
+
+def test_who_waits_for_room_gets_it() -> None:
+    store = HeldStore()
+    archive = LongTermMemory(Memory(store), Consolidation(backlog=1, wait=30))
+    with behind(archive) as server:
+        commit(server, update(1))
+        second = Thread(target=commit, args=(server, update(2)))
+        second.start()
+        time.sleep(0.05)
+        assert second.is_alive()
+        store.go.set()
+        second.join(timeout=30)
+        assert not second.is_alive()
+    assert kept(archive.memory) == [1, 2]
+
+
+def test_the_bytes_that_wait_are_bounded_and_a_single_commit_always_fits() -> None:
+    store = HeldStore()
+    archive = LongTermMemory(Memory(store), Consolidation(backlog=2, backlog_bytes=10, wait=0.01))
+    with behind(archive) as server:
+        commit(server, *(update(moment, "x" * 100) for moment in (1, 2, 3)))
+        with pytest.raises(BacklogFull, match="raise the limits"):
+            archive.consolidate([snapshot(4)])
+        store.go.set()
+    assert kept(archive.memory) == [1, 2, 3]
+
+
+def test_what_elm_cannot_keep_is_set_aside_and_the_rest_is_kept(caplog: pytest.LogCaptureFixture) -> None:
+    told: list[SetAside] = []
+    archive = LongTermMemory(in_process(), QUICK, on_set_aside=told.append)
+    with behind(archive) as server:
+        commit(server, update(10), update(GREATEST), update(20))
+        assert archive.flush(timeout=30)
+        assert server.get(CUP.with_timestamp(GREATEST)) is not None
+    assert kept(archive.memory) == [10, 20]
+    (aside,) = archive.set_aside
+    assert told == [aside]
+    assert aside.snapshot.id == CUP.with_timestamp(GREATEST)
+    assert "is beyond the year 9999" in aside.reason
+    status = archive.status()
+    assert status["set_aside"] == 1
+    assert status["last_set_aside"] == [str(aside)]
+    assert "cannot be consolidated" in caplog.text
+
+
+def test_what_the_database_stumbles_over_does_not_hold_up_the_others() -> None:
+    store = FailingStore()
+    store.poison = {"mug": StoreFailure("no"), "jug": ZeroDivisionError("a bug")}
+    archive = LongTermMemory(Memory(store), QUICK)
+    with behind(archive) as server:
+        several = [update(moment, entity=CUP.with_entity(name)) for moment in range(5) for name in ("a", "mug", "b")]
+        commit(server, *several, update(7, entity=CUP.with_entity("jug")))
+        assert archive.flush(timeout=30)
+    assert kept(archive.memory, CUP.with_entity("a")) == kept(archive.memory, CUP.with_entity("b")) == [0, 1, 2, 3, 4]
+    reasons = sorted(each.reason for each in archive.set_aside)
+    assert reasons == ["StoreFailure: no"] * 5 + ["ZeroDivisionError: a bug"]
+
+
+def test_what_is_told_of_snapshots_set_aside_may_fail() -> None:
+    def tell(_: object) -> None:
+        raise ValueError("not now")
+
+    archive = LongTermMemory(in_process(), QUICK, on_set_aside=tell)
+    with behind(archive) as server:
+        commit(server, update(GREATEST), update(10))
+    assert kept(archive.memory) == [10]
+
+
+def test_a_snapshot_that_is_there_with_another_type_is_the_same() -> None:
+    for settings in (QUICK, DURABLE):
+        memory = in_process()
+        for aron_type in (None, t.Object(name="Cup", members={"value": t.Int()})):
+            archive = LongTermMemory(memory, settings)
+            with behind(archive) as server:
+                server.add_segments(
+                    [AddSegment(core_segment="Instance", provider_segment="ObjectLocalizer", aron_type=aron_type)]
+                )
+                commit(server, update(10), update(11, entity=MUG))
+                if aron_type is not None:
+                    commit(server, update(12))
+        assert kept(memory) == [10, 12]
+        assert memory.recall().count() == 3
+        assert archive.set_aside == ()
+
+
+def test_several_threads_commit() -> None:
+    archive = LongTermMemory(in_process(), QUICK)
+    with behind(archive) as server:
+
+        def work(number: int) -> None:
+            for moment in range(100):
+                commit(server, update(moment, entity=CUP.with_entity(f"e{number}")))
+
+        threads = [Thread(target=work, args=(number,)) for number in range(4)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+    assert archive.memory.recall().count() == 400
+    assert LongTermSource(archive.memory).names(CUP.with_entity("")) == ["e0", "e1", "e2", "e3"]
+
+
+# What is evicted
+
+
+class Odd:
+    """Keeps snapshots with an odd reference time, and remembers what it was told."""
+
+    remembers = 16
+
+    def __init__(self) -> None:
+        self.told: list[tuple[int, int]] = []
+        self.asked: list[tuple[int, Usage]] = []
+
+    def keeps(self, evicted: Evicted, now: int) -> bool:
+        self.asked.append((evicted.snapshot.referenced, evicted.usage))
+        return evicted.snapshot.referenced % 2 == 1
+
+    def kept(self, evicted: Evicted, now: int) -> None:
+        self.told.append((evicted.snapshot.referenced, now))
+
+
+def test_what_leaves_working_memory_passes_a_gate() -> None:
+    memory, gate = in_process(), Odd()
+    archive = LongTermMemory(memory, EVICTED, gate=gate, clock=lambda: 77)
+    with behind(archive, limits={MEMORY: 2}) as server:
+        commit(server, update(1))
+        server.query(about_the_cup(AllSnapshots()))
+        commit(server, *(update(moment) for moment in (2, 3, 4, 5)))
+        assert archive.flush(timeout=30)
+        assert kept(memory) == [1, 3]
+        assert archive.status()["forgotten"] == 1
+    assert gate.asked == [(1, Usage(count=1, last=1_000_000_000)), (2, UNUSED), (3, UNUSED)]
+    assert gate.told == [(1, 77), (3, 77)]
+
+
+def test_without_a_gate_all_that_leaves_is_kept_and_nothing_else() -> None:
+    archive = LongTermMemory(in_process(), EVICTED)
+    with behind(archive, limits={MEMORY: 2}) as server:
+        commit(server, *(update(moment) for moment in (1, 2, 3, 4, 5)))
+        assert moments(server.query(about_the_cup(AllSnapshots()))) == [4, 5]
+    assert kept(archive.memory) == [1, 2, 3]
+
+
+def test_a_gate_is_told_what_long_term_memory_has() -> None:
+    memory = in_process()
+    with behind(LongTermMemory(memory, QUICK)) as server:
+        commit(server, *(update(moment) for moment in range(20)), update(3, entity=MUG))
+    gate = Odd()
+    archive = LongTermMemory(memory, EVICTED, gate=gate, clock=lambda: 77)
+    with behind(archive, limits={MEMORY: 1}) as server:
+        commit(server, update(30), update(31), update(32))
+    assert gate.told == [*((moment, 1_000_000_000) for moment in range(4, 20)), (31, 77)]
+
+
+def test_the_gate_is_asked_once_however_often_the_database_fails() -> None:
+    store, gate = FailingStore(), Odd()
+    store.errors = [DatabaseUnreachable("no route")] * 3
+    archive = LongTermMemory(Memory(store), EVICTED, gate=gate)
+    with behind(archive, limits={MEMORY: 1}) as server:
+        commit(server, update(1), update(2), update(3))
+    assert [moment for moment, _ in gate.asked] == [1, 2]
+    assert kept(archive.memory) == [1]
+
+
+def test_nothing_is_forgotten_because_a_gate_fails(caplog: pytest.LogCaptureFixture) -> None:
+    class Broken(Odd):
+        def keeps(self, evicted: Evicted, now: int) -> bool:
+            raise ZeroDivisionError("a bug")
+
+    archive = LongTermMemory(in_process(), EVICTED, gate=Broken())
+    with behind(archive, limits={MEMORY: 1}) as server:
+        commit(server, update(1), update(2))
+    assert kept(archive.memory) == [1]
+    assert archive.status()["last_error"] == "ZeroDivisionError: a bug"
+    assert "which is consolidated" in caplog.text
+
+
+def test_nothing_is_lost_because_a_place_cannot_be_found() -> None:
+    class Lost:
+        def region(self, moment: int) -> Region | None:
+            raise ZeroDivisionError("a bug")
+
+    archive = LongTermMemory(in_process(), QUICK, location=Lost())
+    with behind(archive) as server:
+        commit(server, update(1))
+    assert kept(archive.memory) == [1]
+    assert archive.status()["place_failures"] == archive.status()["without_region"] == 1
+
+
+def test_a_name_that_is_no_agent_is_refused_at_once() -> None:
+    with pytest.raises(InvalidValue, match="the agent of a long-term memory, which is the robot, is empty"):
+        LongTermMemory(in_process(), agent="")
+
+
+def test_commits_wait_for_room_for_what_is_evicted() -> None:
+    store = HeldStore()
+    archive = LongTermMemory(Memory(store), Consolidation(when=When.ON_EVICTION, backlog=2, wait=0.01))
+    with behind(archive, limits={MEMORY: 1}) as server:
+        commit(server, update(1), update(2), update(3))
+        result: CommitResult = server.commit(Commit(updates=[update(4)]))
+        assert "takes no more for now" in result.errors[0]
+        store.go.set()
+        assert archive.flush(timeout=30)
+        commit(server, update(4))
+    assert kept(archive.memory) == [1, 2, 3]
+
+
+@pytest.mark.parametrize(
+    ("settings", "says"),
+    [
+        ({"when": "sometimes"}, "consolidated on_commit or on_eviction, not 'sometimes'"),
+        ({"when": "on_eviction", "durable": True}, "only durable with when='on_commit'"),
+        ({"backlog": 0}, "backlog of consolidation is 1 or more, not 0"),
+        ({"batch": True}, "batch of consolidation is 1 or more, not True"),
+        ({"wait": -1}, "wait of consolidation is 0 s or more, not -1"),
+        ({"patience": float("nan")}, "patience of consolidation is 0 s or more, not nan"),
+    ],
+)
+def test_wrong_settings_are_refused(settings: dict[str, object], says: str) -> None:
+    with pytest.raises(InvalidArchive, match=says):
+        Consolidation(**settings)  # type: ignore[arg-type]
