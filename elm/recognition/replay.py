@@ -94,7 +94,9 @@ def _keep(store: LoggedStore, taken: Taken, found: list[UUID], new: list[UUID], 
     wholes = [result.events[-1] for _, result in taken.results]
     found += [each.uid for each in wholes]
     if not commit:
-        new += [each.uid for each in wholes if not store.exists(UidCue(uids=(each.uid,)))]
+        absent = [each.uid for each in wholes if not store.exists(UidCue(uids=(each.uid,)))]
+        forgotten = {each.uid for each in store.tombstones(absent)}
+        new += [uid for uid in absent if uid not in forgotten]
         return
     events: list[Event] = [event for _, result in taken.results for event in result.events]
     kept = keep_results(store, [Arrival(event=event) for event in events], store.commit_all)

@@ -6,6 +6,9 @@ from collections.abc import Callable, Iterable, Sequence
 from datetime import datetime
 from uuid import UUID
 
+import psycopg
+
+from elm.errors import DatabaseUnfit
 from elm.storage import forgetting_statements as sql
 from elm.storage.connections import Connection
 from elm.tombstone import Forgotten
@@ -18,7 +21,7 @@ TypeNames = Callable[[Connection, Iterable[int]], dict[int, str]]
 
 
 class _FirstTombstone(Exception):
-    """The memory has never had a tombstone, and is about to get one."""
+    """The memory is about to get a tombstone, and some writers may not look for it."""
 
 
 def forget(connection: Connection, ids: Sequence[int], run: UUID, at: datetime, names: TypeNames) -> Forgotten:
@@ -41,8 +44,10 @@ def _forget(connection: Connection, ids: Sequence[int], run: UUID, at: datetime,
     touched = _numbers(connection, sql.LOCK_TOMBSTONES, going)
     connection.execute(sql.UNLINK, {"ids": going})
     kept = _numbers(connection, sql.STILL_PARTS, going)
-    if kept and is_pristine(connection):
+    if kept and not admits_tombstones(connection):
         raise _FirstTombstone
+    if kept:
+        connection.execute(sql.JOIN_TWINS, {"ids": kept})
     dissolved = sorted(set(touched) - set(_numbers(connection, sql.STILL_PARTS, touched)))
     rest = sorted(set(going) - set(kept))
     told = {"run": run, "at": at, "ids": rest, "dissolved": dissolved}
@@ -79,20 +84,34 @@ def would_forget(connection: Connection, ids: Sequence[int], names: TypeNames) -
     )
 
 
-def is_pristine(connection: Connection) -> bool:
-    """Whether the memory has never had a tombstone."""
-    ((answer,),) = connection.execute(sql.IS_PRISTINE).fetchall()
-    return bool(answer)
+def admits_tombstones(connection: Connection) -> bool:
+    """Whether every statement of every process looks for tombstones."""
+    return _says(connection, sql.ADMITS_TOMBSTONES)
 
 
 def admit_tombstones(connection: Connection) -> None:
     """Have every statement of every process look for tombstones from now on; none is there before that is certain."""
-    with connection.transaction():
-        connection.execute(sql.LOCK_PRISTINE, [_LOCK])
-        if is_pristine(connection):
-            connection.execute(sql.END_PRISTINE)
-    with connection.transaction():
-        connection.execute(sql.WAIT_FOR_WRITERS)
+    try:
+        with connection.transaction():
+            connection.execute(sql.LOCK_PRISTINE, [_LOCK])
+            if _says(connection, sql.IS_PRISTINE):
+                connection.execute(sql.END_PRISTINE)
+        with connection.transaction():
+            connection.execute(sql.WAIT_FOR_WRITERS)
+            connection.execute(sql.LOCK_PRISTINE, [_LOCK])
+            if not admits_tombstones(connection):
+                connection.execute(sql.ADMIT_TOMBSTONES)
+    except psycopg.errors.InsufficientPrivilege as error:
+        said = error.diag.message_primary
+        raise DatabaseUnfit(
+            f"the first tombstone of a memory needs the database user who created it: {said}. "
+            f"Forget, or load the tombstones, as that user once; afterwards others can"
+        ) from error
+
+
+def _says(connection: Connection, question: str) -> bool:
+    ((answer,),) = connection.execute(question).fetchall()
+    return bool(answer)
 
 
 def _numbers(connection: Connection, statement: str, ids: Sequence[int]) -> list[int]:

@@ -47,6 +47,8 @@ _SESSION = {
 WRITING = {"plan_cache_mode": "force_generic_plan"}
 # A recall's best plan depends on the cue's values, and starting parallel workers costs more than they save.
 RECALLING = {"plan_cache_mode": "force_custom_plan", "max_parallel_workers_per_gather": "0"}
+# But for events asked for one by one there is one good plan, and making it anew costs several times what running it does.
+NAMING = {**RECALLING, "plan_cache_mode": "force_generic_plan"}
 
 # Decoded by elm, when somebody looks: until then the bytes as they came.
 _RAW_OIDS = (
@@ -196,6 +198,7 @@ class Connections:
         self._closed = False
         self._lock = Lock()
         self._idle: deque[Connection] = deque()
+        self._idle_named: deque[Connection] = deque()
         self._writing: Connection | None = None
         self._write_lock = Lock()
         self._opened: WeakSet[Connection] = WeakSet()
@@ -221,13 +224,17 @@ class Connections:
                 yield self._writing
 
     @contextmanager
-    def recalling(self) -> Iterator[Connection]:
-        """A connection to recall with, to one caller at a time; handed on when the caller is done."""
+    def recalling(self, *, named: bool = False) -> Iterator[Connection]:
+        """A connection to recall with, to one caller at a time; handed on when the caller is done.
+
+        One for `named` events plans a prepared statement once, whatever its values.
+        """
         self.check_open()
+        idle = self._idle_named if named else self._idle
         with self._lock:
-            connection = self._idle.pop() if self._idle else None
+            connection = idle.pop() if idle else None
         if connection is None or _is_lost(connection):
-            connection = self._open(RECALLING)
+            connection = self._open(NAMING if named else RECALLING)
         try:
             with translated(self._memory):
                 yield connection
@@ -237,7 +244,7 @@ class Connections:
                 connection.close()
             else:
                 with self._lock:
-                    self._idle.append(connection)
+                    idle.append(connection)
 
     def check_open(self) -> None:
         """Refuse to go on after `close`."""
@@ -248,8 +255,9 @@ class Connections:
         """Close all connections; one that a result is still being read from closes when that ends."""
         self._closed = True
         with self._lock:
-            while self._idle:
-                self._idle.pop().close()
+            for idle in (self._idle, self._idle_named):
+                while idle:
+                    idle.pop().close()
         if self._writing is not None:
             self._writing.close()
 

@@ -22,9 +22,21 @@ UNLINK = "DELETE FROM part WHERE whole_id = ANY(%(ids)s)"
 
 STILL_PARTS = "SELECT DISTINCT part_id FROM part WHERE part_id = ANY(%(ids)s)"
 
+# An event beside its tombstone (docs/adr/0010 says when there is one): the wholes of both have one part again.
+JOIN_TWINS = """
+WITH twin AS (
+    SELECT e.id AS event_id, t.id AS tombstone_id, least(e.id, t.id) AS first
+    FROM event e JOIN tombstone t USING (uid) WHERE e.id = ANY(%(ids)s)
+), linked AS (
+    UPDATE part SET part_id = first FROM twin WHERE part_id IN (event_id, tombstone_id) AND part_id <> first
+)
+UPDATE tombstone SET id = first FROM twin WHERE id = tombstone_id AND id <> first
+"""
+
 BURY = """
 INSERT INTO tombstone (id, uid, period, frame_id, region, subject_frame_id, subject, agent, run)
 SELECT id, uid, period, frame_id, region, subject_frame_id, subject, agent, %(run)s FROM event WHERE id = ANY(%(ids)s)
+ON CONFLICT (uid) DO NOTHING
 """
 
 # What is left of the rest: of events that no whole has, and of tombstones that none has any more.
@@ -92,11 +104,14 @@ GROUP BY type_id
 """  # noqa: S608 - the pieces are constants of this module
 
 # Before the first tombstone ever: from now on statements look for tombstones. Plans in which this was a constant
-# are made anew; whoever is still running one holds the lock on `event` that is waited for then.
+# are made anew; whoever is still running one holds the lock on `event` that is waited for then. That it was waited
+# for stands at the function: others who forget meanwhile, or after one who was killed, wait as well.
 IS_PRISTINE = "SELECT nothing_forgotten()"
 LOCK_PRISTINE = "SELECT pg_advisory_xact_lock(%s)"
 END_PRISTINE = "CREATE OR REPLACE FUNCTION nothing_forgotten() RETURNS boolean LANGUAGE sql IMMUTABLE AS 'SELECT false'"
 WAIT_FOR_WRITERS = "LOCK TABLE event IN SHARE MODE"
+ADMITS_TOMBSTONES = "SELECT obj_description('nothing_forgotten()'::regprocedure, 'pg_proc') IS NOT NULL"
+ADMIT_TOMBSTONES = "COMMENT ON FUNCTION nothing_forgotten() IS 'all writers look for tombstones'"
 
 # Reading
 

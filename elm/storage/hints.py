@@ -31,6 +31,11 @@ def is_pinned(cue: Cue) -> bool:
             return False
 
 
+def is_named(cue: Cue) -> bool:
+    """Whether that is all the cue says: then one plan is good for whatever is named."""
+    return not isinstance(cue, And) and is_pinned(cue)
+
+
 def is_guess(cue: Cue) -> bool:
     """Whether the planner takes a third of what else matches for the answer, having nothing to tell it by."""
     return any(map(is_guess, cue.args)) if isinstance(cue, And) else isinstance(cue, DurationCue)

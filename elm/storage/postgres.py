@@ -39,6 +39,7 @@ from elm.store import (
     Group,
     Grouping,
     Join,
+    Nearest,
     Query,
     Statistics,
     TypesAdded,
@@ -138,8 +139,10 @@ class PostgresStore(PostgresForgetting):
     def find(self, query: Query) -> Iterator[StoredEvent]:
         """The events a query asks for, streamed from one consistent view."""
         text, values = self._asked("find", query, recall_statements.find)
-        few = hints.is_pinned(query.cue) or (query.limit is not None and query.limit <= CHUNK)
-        return self._events(text, values, at_once=few)
+        named = hints.is_named(query.cue) and not isinstance(query.order, Nearest)
+        if named or hints.is_pinned(query.cue) or (query.limit is not None and query.limit <= CHUNK):
+            return self._events(text, values, named=named)
+        return self._streamed_events(text, values)
 
     def ids(self, query: Query) -> Iterator[int]:
         """Their ids alone."""
@@ -165,7 +168,7 @@ class PostgresStore(PostgresForgetting):
         self._session.ready_to_recall()
         text = self._statements.text("by id", recall_statements.by_ids)
         possible = [number for number in ids if 0 < number <= MOST_ID]
-        return list(self._events(text, {"ids": possible}, at_once=True))
+        return list(self._events(text, {"ids": possible}, named=True))
 
     def groups(self, cue: Cue, by: Grouping | ByFeature) -> list[Group]:
         """The matching events by key, keys in ascending order, None last."""
@@ -276,25 +279,23 @@ class PostgresStore(PostgresForgetting):
         self._session.ready_to_recall()
         return compile_cue(cue, self._names, prefix=prefix)
 
-    def _events(self, text: str, values: dict[str, Any], *, at_once: bool) -> Iterator[StoredEvent]:
-        with self._connections.recalling() as connection:
-            if at_once:
-                rows = connection.execute(text, values, binary=True).fetchall()
-                self._session.learn(rows, connection)
-            else:
-                yield from self._streamed_events(connection, text, values)
-                return
+    def _events(self, text: str, values: dict[str, Any], *, named: bool) -> Iterator[StoredEvent]:
+        """A few events, fetched at once; named ones by a prepared statement, which is planned once."""
+        with self._connections.recalling(named=named) as connection:
+            rows = connection.execute(text, values, prepare=named or None, binary=True).fetchall()
+            self._session.learn(rows, connection)
         decode = self._session.decode
         for row in rows:
             yield StoredEvent.of_row(row, decode)
 
-    def _streamed_events(self, connection: Connection, text: str, values: dict[str, Any]) -> Iterator[StoredEvent]:
-        stream = self._stream(connection, text, values)
+    def _streamed_events(self, text: str, values: dict[str, Any]) -> Iterator[StoredEvent]:
         decode = self._session.decode
-        while chunk := list(islice(stream, CHUNK)):
-            self._session.learn(chunk)
-            for row in chunk:
-                yield StoredEvent.of_row(row, decode)
+        with self._connections.recalling() as connection:
+            stream = self._stream(connection, text, values)
+            while chunk := list(islice(stream, CHUNK)):
+                self._session.learn(chunk)
+                for row in chunk:
+                    yield StoredEvent.of_row(row, decode)
 
     def _stream(self, connection: Connection, text: str, values: dict[str, Any]) -> Iterator[Sequence[Any]]:
         size = CHUNK if _CHUNKED else 1

@@ -44,8 +44,8 @@ def stage(connection: Connection, rows: Iterable[tuple[int, int, encoding.Row]])
 
 def lock_parts(connection: Connection, uids: Sequence[UUID]) -> bool:
     """Have nobody close or forget the events of these uids before the transaction ends; whether one is a tombstone."""
-    ((_, forgotten),) = connection.execute(sql.LOCK_PARTS, {"uids": uids}).fetchall()
-    return bool(forgotten)
+    connection.execute(sql.LOCK_PARTS, {"uids": uids})
+    return bool(connection.execute(sql.LOCK_FORGOTTEN_PARTS, {"uids": uids}).fetchall())
 
 
 def log(connection: Connection, written: Iterable[Written], now: datetime) -> None:

@@ -9,7 +9,7 @@ from uuid import UUID
 from elm.geometry import Region
 from elm.interval import Interval
 from elm.storage import forgetting_statements as sql
-from elm.storage.batch_forgetting import admit_tombstones, is_pristine
+from elm.storage.batch_forgetting import admit_tombstones, admits_tombstones
 from elm.storage.connections import Connection
 from elm.storage.rows import moment
 from elm.storage.tables import HULL_OF_REGIONS, HULL_OF_SUBJECTS
@@ -73,7 +73,7 @@ def keep(
     frame_ids: Callable[[str], int],
 ) -> BatchReport:
     """Keep tombstones of another memory, in one transaction."""
-    if is_pristine(connection):
+    if not admits_tombstones(connection):
         admit_tombstones(connection)
     with connection.transaction():
         connection.execute(sql.TAKE_TURNS)

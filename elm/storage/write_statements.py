@@ -151,15 +151,12 @@ ON CONFLICT (uid) DO UPDATE SET uid = excluded.uid WHERE event.content = exclude
 RETURNING id, uid, xmax <> 0 AS existed, upper_inf(period) AS is_open, agent
 """)
 
-# Only of parts that were there before: those of the same transaction nobody else can close or forget. How many of
-# them are tombstones.
-LOCK_PARTS = """
-WITH there AS MATERIALIZED (
-    SELECT id FROM event WHERE uid = ANY(%(uids)s) ORDER BY id FOR SHARE
-), forgotten AS MATERIALIZED (
-    SELECT id FROM tombstone WHERE uid = ANY(%(uids)s) AND NOT nothing_forgotten() ORDER BY id FOR SHARE
-)
-SELECT (SELECT count(*) FROM there), (SELECT count(*) FROM forgotten)
+# Only of parts that were there before: those of the same transaction nobody else can close or forget.
+LOCK_PARTS = "SELECT id FROM event WHERE uid = ANY(%(uids)s) ORDER BY id FOR SHARE"
+
+# In a statement of its own, which sees what became of parts while their locks were waited for.
+LOCK_FORGOTTEN_PARTS = """
+SELECT id FROM tombstone WHERE uid = ANY(%(uids)s) AND NOT nothing_forgotten() ORDER BY id FOR SHARE
 """
 
 _LEVEL = _filled("""

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, Final
 
 from armem_bridge.ice import MemoryClient
 from armem_bridge.working import Commit, MemoryServer
@@ -14,6 +15,12 @@ from simulators.armem.series import in_microseconds
 from simulators.bench.timing import in_turn, mean_ratio, median_ratio, seconds, steady_heap
 
 Call = Callable[[], object]
+
+PAIRS: Final = (("commit", "echo"), ("query", "echo"), ("commit", "bare_commit"), ("query", "bare_query"))
+"""What is compared with what. Of each pair one call follows the other: so neither process is warmer than the other."""
+
+STEPS: Final = len(PAIRS) * len(KINDS)
+"""How often `measure` says that so many samples are done."""
 
 
 def measure(
@@ -32,43 +39,43 @@ def _of_kind(
 ) -> dict[str, Any]:
     data = kind.make(1).to_aron()
     # Made beforehand: what is done between the calls would push their code out of the processor's caches.
-    commits = [batch(kind, [data], next(first) * ENTRIES) for _ in range(samples + 1)]
+    commits = [batch(kind, [data], next(first) * ENTRIES) for _ in range(2 * (samples + 1))]
+    found: dict[str, list[float]] = defaultdict(list)
+    ratios: dict[str, float] = {}
     with make_server(kind) as core, steady_heap():
-        found = {
-            **_in_turn(_remote_calls(client, echo, kind, commits), samples, advance),
-            **_in_turn(_local_calls(echo, core, kind, commits), samples, lambda _: None),
-        }
-    return {
-        "commit_vs_echo": median_ratio(found["commit"], found["echo"]),
-        "query_vs_echo": median_ratio(found["query"], found["echo"]),
-        "commit_vs_echo_means": mean_ratio(found["commit"], found["echo"]),
-        "query_vs_echo_means": mean_ratio(found["query"], found["echo"]),
-        "commit_vs_bare_messages": median_ratio(found["commit"], found["bare_commit"]),
-        "query_vs_bare_messages": median_ratio(found["query"], found["bare_query"]),
-        **{name: in_microseconds(series) for name, series in found.items()},
-    }
+        calls = _remote_calls(client, echo, kind, commits)
+        for ours, bare in PAIRS:
+            series = _in_turn({name: calls[name] for name in (ours, bare)}, samples)
+            ratios[f"{ours}_vs_{bare}"] = median_ratio(series[ours], series[bare])
+            ratios[f"{ours}_vs_{bare}_means"] = mean_ratio(series[ours], series[bare])
+            for name, times in series.items():
+                found[name] += times
+            advance(samples)
+        found |= _in_turn(_local_calls(echo, core, kind, commits), samples)
+    return {**ratios, **{name: in_microseconds(series) for name, series in found.items()}}
 
 
-def _in_turn(calls: Mapping[str, Call], samples: int, advance: Callable[[int], None]) -> dict[str, list[float]]:
+def _in_turn(calls: Mapping[str, Call], samples: int) -> dict[str, list[float]]:
     """Seconds of each call, by their names; the calls take turns."""
     found: dict[str, list[float]] = {name: [] for name in calls}
     for turn in range(samples + 1):
         for name in in_turn(list(calls), turn):
             taken = seconds(calls[name])
-            # At first connections are made, and the bare memory learns what to answer.
+            # At first connections are made.
             if turn:
                 found[name].append(taken)
-        advance(1 if turn else 0)
     return found
 
 
 def _remote_calls(client: MemoryClient, echo: Echo, kind: Kind, commits: Sequence[Commit]) -> dict[str, Call]:
-    """What goes through Ice: bare, and to the memory. The first one of the bare calls is a commit."""
+    """What goes through Ice: to the memory, and bare."""
     wire, memory = client.wire, client.memory(kind.name)
     query, following = latest(kind, 1), iter(commits)
     sent = wire.aron.write(commits[0].updates[0].instances[0])
     commit_sent, query_sent = wire.commits.write_commit(commits[0]), wire.queries.write(query)
     echo.forget()
+    # What it is to answer.
+    echo.memory.commit(commit_sent)
     return {
         "bare_commit": lambda: echo.memory.commit(commit_sent),
         "bare_query": lambda: echo.memory.query(query_sent),

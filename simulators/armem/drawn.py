@@ -23,7 +23,7 @@ _CALLS = {
 }
 """In the order of the plot; limits are what Ice takes without a memory."""
 _LIMITS = [shown for shown in _CALLS.values() if shown.startswith("limit")]
-_RATIOS = ("commit_vs_echo", "query_vs_echo", "commit_vs_bare_messages", "query_vs_bare_messages")
+_RATIOS = ("commit_vs_echo", "query_vs_echo", "commit_vs_bare_commit", "query_vs_bare_query")
 _WAYS = {"direct": "direct call", "topic": "topic", "memory": "memory"}
 _KEPT = ("query_ltm", "query_wm", "query_both", "durable_commit")
 _PARTS = ("to_aron", "commit", "from_aron", "query")
@@ -62,6 +62,8 @@ def _paragraphs(figures: Mapping[str, Any], pictures: Path) -> Iterator[str]:
             _long_term_rows(figures["long_term"]),
         )
     if figures["forgetting"] is not None:
+        yield "### Forgetting\n\n"
+        yield "Table 5.1 of the thesis on data of our own: what mechanisms of forgetting keep, lose and cost.\n\n"
         yield forgetting.table(figures["forgetting"])
 
 

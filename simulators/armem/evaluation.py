@@ -109,7 +109,7 @@ def _through_ice(samples: int, wanted: Collection[str], first: Iterator[int]) ->
         locator = server.line()
         with MemoryClient(load_channel()[0], locator) as client:
             if "calls" in wanted:
-                with progress("single calls against an echo", total=samples * len(KINDS)) as advance:
+                with progress("single calls against an echo", total=against_echo.STEPS * samples) as advance:
                     figures["calls"] = against_echo.measure(client, samples=samples, first=first, advance=advance)
             if "batches" in wanted:
                 figures["batches"] = _batches(samples, {name: client.memory(name) for name in KINDS}, first)

@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from select import select
 from types import TracebackType
 from typing import Final, Self
 
@@ -14,6 +15,8 @@ from elm.errors import StoreFailure
 ROOT: Final = Path(__file__).resolve().parents[2]
 _ENDING: Final = 20.0
 """Seconds in which a process ends once it is told to."""
+_SILENCE: Final = 60.0
+"""Seconds after which a process is given up that does not answer."""
 
 
 class Process:
@@ -25,18 +28,24 @@ class Process:
             [sys.executable, "-m", module, *arguments],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            text=True,
             cwd=ROOT,
             env={**os.environ, "PYTHONPATH": str(ROOT)},
         )
+        assert self._process.stdout is not None  # noqa: S101 - a pipe
+        self._out = self._process.stdout
+        self._read = b""
 
     def line(self) -> str:
         """The next line that it writes."""
-        assert self._process.stdout is not None  # noqa: S101 - a pipe
-        line = self._process.stdout.readline()
-        if not line:
-            raise StoreFailure(f"{self._module} ended before it answered: see what it wrote to stderr")
-        return line.strip()
+        while b"\n" not in self._read:
+            ready, _, _ = select([self._out], [], [], _SILENCE)
+            more = os.read(self._out.fileno(), 4096) if ready else b""
+            if not more:
+                how = "ended" if ready else f"was silent for {_SILENCE:g} s"
+                raise StoreFailure(f"{self._module} {how} before it answered: see what it wrote to stderr")
+            self._read += more
+        line, _, self._read = self._read.partition(b"\n")
+        return line.decode()
 
     def close(self) -> None:
         """Have it end."""
