@@ -5,18 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import Final
+from uuid import UUID
 
 from armem_bridge.forgetting.candidates import Candidate
 from armem_bridge.forgetting.mechanisms import LatentSimilarity, Offline
 from armem_bridge.forgetting.offline import make_plan
 from armem_bridge.forgetting.plan import Plan
 from armem_bridge.long_term.contents import entities
-from armem_bridge.long_term.mapping import below
+from armem_bridge.long_term.mapping import below, is_snapshot
 from armem_bridge.long_term.source import LongTermSource
 from armem_bridge.memory_id import MemoryID
 from armem_bridge.moments import to_datetime
 from elm.app import Memory
-from elm.cues import any_of, time
+from elm.cues import any_of, time, uid
 from elm.cues.algebra import Cue
 from elm.interval import Interval, to_micros
 
@@ -71,15 +72,20 @@ class LongTermForgetting:
         for entity, moments in by_entity.items():
             for start in range(0, len(moments), AT_ONCE):
                 cue = _versions(entity, moments[start : start + AT_ONCE])
-                there = self._moments(cue)
-                report = self._elm.forget(cue)
+                there = self._found(cue)
+                if not there:
+                    continue
+                # Named by their uids: others may have events with these features at these times, which stay.
+                report = self._elm.forget(uid(*there))
                 self.events += report.events
                 self.held += report.held
-                went += len(there - self._moments(cue)) if report.held else len(there)
+                left = set(self._found(cue).values()) if report.held else set()
+                went += len(set(there.values()) - left)
         return went
 
-    def _moments(self, cue: Cue) -> set[int]:
-        return {to_micros(event.interval.begin) for event in self._elm.recall(cue)}
+    def _found(self, cue: Cue) -> dict[UUID, int]:
+        """The versions of snapshots that a cue finds, with their reference times."""
+        return {event.uid: to_micros(event.interval.begin) for event in self._elm.recall(cue) if is_snapshot(event)}
 
 
 def _versions(entity: MemoryID, moments: Iterable[int]) -> Cue:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import ExitStack
 from types import MappingProxyType, TracebackType
 from typing import TYPE_CHECKING, Final, Self, assert_never
@@ -19,8 +19,7 @@ from armem_bridge.long_term.robot_place import MAX_AGE
 from armem_bridge.long_term.subjects import RADIUS
 from armem_bridge.moments import Clock, now
 from armem_bridge.names import MemoryNameSystem
-from armem_bridge.working import Archive, Evicted, MemoryServer, Snapshot
-from armem_bridge.working.history import Source
+from armem_bridge.working import Archive, MemoryServer
 from armem_bridge.working.status import ServerStatus
 
 if TYPE_CHECKING:
@@ -63,12 +62,12 @@ class Service:
         self._clock = clock
         self._is_started = False
         self._running = ExitStack()
+        self._behind = ExitStack()
         self._servers: dict[str, MemoryServer] = {}
         self._archive: LongTermMemory | None = None
         self._places: RobotPlaces | None = None
         self._edge: Edge | None = None
         self._address = ""
-        self._stop_timeout = STOP_TIMEOUT
 
     @property
     def servers(self) -> Mapping[str, MemoryServer]:
@@ -99,9 +98,9 @@ class Service:
         if self._is_started:
             raise ServiceClosed(f"the service of {self.config.file} was started before: make a new one")
         self._is_started = True
-        with ExitStack() as starting:
+        with ExitStack() as behind, ExitStack() as starting:
             if self.config.long_term is not None:
-                self._archive = self._remember(self.config.long_term, starting)
+                self._archive = self._remember(self.config.long_term, behind)
             for memory in self.config.memories:
                 server = starting.enter_context(self._server(memory))
                 self._servers[server.name] = server
@@ -113,16 +112,19 @@ class Service:
             for server in self._servers.values():
                 self.names.register(server.name, server)
                 starting.callback(self.names.unregister, server.name)
-            self._running = starting.pop_all()
+            self._running, self._behind = starting.pop_all(), behind.pop_all()
         return self
 
     def stop(self, timeout: float = STOP_TIMEOUT) -> None:
         """Stop everything, and make durable what waits; again changes nothing.
 
-        `NotConsolidated` where that takes longer than `timeout` seconds.
+        `NotConsolidated` where that takes longer than `timeout` seconds: it is tried on until the process ends, and
+        stopping again waits again.
         """
-        self._stop_timeout = timeout
         self._running.close()
+        if self._archive is not None:
+            self._archive.close(timeout)
+        self._behind.close()
 
     def status(self) -> ServiceStatus:
         """How everything is, or was at the stop. Raises `ServiceClosed` before the start."""
@@ -145,10 +147,10 @@ class Service:
 
     # Inside
 
-    def _remember(self, wanted: LongTermConfig, starting: ExitStack) -> LongTermMemory:
+    def _remember(self, wanted: LongTermConfig, behind: ExitStack) -> LongTermMemory:
         from elm.app import connect
 
-        memory = starting.enter_context(connect(wanted.dsn, wanted.memory))
+        memory = behind.enter_context(connect(wanted.dsn, wanted.memory))
         # Who gave a wrong address hears of it now: later on, a database may be away.
         memory.add_type(ROOT)
         state = wanted.robot_state
@@ -169,14 +171,11 @@ class Service:
             gate=ForgettingGate(OnlineForgetting(self.config.online)) if self.config.online else None,
             clock=self._clock,
         )
-        starting.callback(lambda: archive.close(self._stop_timeout))
+        behind.callback(archive.close)
         return archive
 
     def _server(self, config: MemoryConfig) -> MemoryServer:
-        archive: Archive | None = self._archive
-        if archive is not None and self._places is not None:
-            archive = _PlacesNoted(archive, self._places)
-        return memory_server(config, archive=archive, clock=self._clock)
+        return memory_server(config, archive=self._archive, clock=self._clock)
 
 
 def memory_server(config: MemoryConfig, *, archive: Archive | None = None, clock: Clock = now) -> MemoryServer:
@@ -194,31 +193,6 @@ def memory_server(config: MemoryConfig, *, archive: Archive | None = None, clock
         delay_threshold=config.delay_threshold,
         update_bytes=config.update_bytes,
     )
-
-
-class _PlacesNoted:
-    """The archive, and on the way to it what the snapshots tell of where the robot is.
-
-    So poses are known before anything is consolidated that came after them, also where working memory keeps
-    none of them for long.
-    """
-
-    def __init__(self, archive: Archive, places: RobotPlaces) -> None:
-        self._archive = archive
-        self._places = places
-
-    def consolidate(self, snapshots: Sequence[Snapshot]) -> None:
-        self._places.note(snapshots)
-        self._archive.consolidate(snapshots)
-
-    def on_eviction(self, evicted: Sequence[Evicted]) -> None:
-        self._archive.on_eviction(evicted)
-
-    def source(self, memory: str) -> Source | None:
-        return self._archive.source(memory)
-
-    def status(self) -> Mapping[str, object]:
-        return self._archive.status()
 
 
 def _edge(config: IceConfig, servers: list[MemoryServer]) -> tuple[Edge, str]:

@@ -204,7 +204,7 @@ def _array(value: Any, type_object: t.NDArray, path: Path) -> NDArray:
     made = from_numpy(array)
     if type_object.element and element_of(made) != element_name(type_object.element):
         raise NotConvertible(f"{_at(path)}elements of type {array.dtype} are no {type_object.element}")
-    if type_object.shape is not None and not fits(extents_of(made), type_object.shape):
+    if type_object.shapes and not any(fits(extents_of(made), shape) for shape in type_object.shapes):
         raise NotConvertible(f"{_at(path)}an array of {list(array.shape)} is no {name_of(type_object)}")
     return made
 

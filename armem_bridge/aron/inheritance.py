@@ -65,5 +65,6 @@ def _compare_arrays(base: t.NDArray, extending: t.NDArray, path: Path, found: li
         found.append(f"{show_path(path)} has elements of type {given}, not {base.element!r}")
     if base.shape is None:
         return
-    if extending.shape is None or not fits(extending.shape, base.shape):
+    shapes = extending.shapes
+    if not shapes or not all(any(fits(shape, wanted) for wanted in base.shapes) for shape in shapes):
         found.append(f"{show_path(path)} is {name_of(extending)}, not {name_of(base)}")

@@ -58,6 +58,7 @@ def unify(one: t.TypeObject, other: t.TypeObject) -> t.TypeObject:
                 shape=_common_shape(one.shape, other.shape),
                 element=one.element if one.element == other.element else "",
                 maybe=maybe,
+                either_order=one.either_order or other.either_order,
             )
         case _:
             return t.Any(maybe=maybe)

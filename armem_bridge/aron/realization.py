@@ -163,7 +163,7 @@ def _walk(
 
 def _walk_array(data: d.NDArray, type_object: t.NDArray, path: Path, wrong: list[tuple[Path, str]]) -> None:
     extents = extents_of(data)
-    if type_object.shape is not None and not fits(extents, type_object.shape):
+    if type_object.shapes and not any(fits(extents, shape) for shape in type_object.shapes):
         wrong.append((path, f"is an NDArray of {list(extents)}, and its type {name_of(type_object)}"))
     elif type_object.element and element_of(data) != element_name(type_object.element):
         wrong.append((path, f"has elements of type {data.type!r}, not {type_object.element!r}"))
@@ -211,7 +211,8 @@ def name_of(type_object: t.TypeObject) -> str:
             return f"NDArray of {type_object.element or 'anything'}"
         case t.NDArray():
             shape = [extent if extent is not None else "any" for extent in type_object.shape or ()]
-            return f"NDArray of {shape} {type_object.element or 'anything'}".replace("'", "")
+            order = " in either order" if type_object.either_order else ""
+            return f"NDArray of {shape}{order} {type_object.element or 'anything'}".replace("'", "")
         case _:
             return type(type_object).__name__
 

@@ -132,6 +132,7 @@ def _expression(type_object: t.TypeObject, names: dict[Named, str]) -> str:
             first, second = (_expression(part, names) for part in parts_of(type_object))
             return f"t.Pair(first={first}, second={second}{maybe})"
         case t.NDArray():
-            return f"t.NDArray(shape={type_object.shape!r}, element={type_object.element!r}{maybe})"
+            order = ", either_order=True" if type_object.either_order else ""
+            return f"t.NDArray(shape={type_object.shape!r}, element={type_object.element!r}{order}{maybe})"
         case _:
             return f"t.{type(type_object).__name__}({maybe.removeprefix(', ')})"

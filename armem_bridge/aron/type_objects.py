@@ -57,20 +57,34 @@ class NDArray(msgspec.Struct, frozen=True, kw_only=True, tag_field="kind", tag="
     `shape` are the extents without the bytes per element, None for any number there; without `shape` the
     array may have any. Extents of 1 at either end do not count: a vector of 3 is also one of 3 x 1. `element`
     names the element type ("uint8", "float32", "pcl::PointXYZRGBA" ...), empty for any; `aron.arrays` says
-    which names mean the same.
+    which names mean the same. With `either_order` the first two extents may also stand in the other order, as
+    those of images do: ArmarX describes them as width x height, and numpy has them as height x width.
     """
 
     shape: tuple[int | None, ...] | None = None
     element: str = ""
     maybe: bool = False
+    either_order: bool = False
 
     depth: ClassVar[int] = 0
 
     if TYPE_CHECKING:
 
         def __init__(
-            self, *, shape: Iterable[int | None] | None = ..., element: str = ..., maybe: bool = ...
+            self,
+            *,
+            shape: Iterable[int | None] | None = ...,
+            element: str = ...,
+            maybe: bool = ...,
+            either_order: bool = ...,
         ) -> None: ...
+
+    @property
+    def shapes(self) -> tuple[tuple[int | None, ...], ...]:
+        """The shapes that it may have, the one that it is described by first; none where it may have any."""
+        if self.shape is None:
+            return ()
+        return (self.shape, (*self.shape[1::-1], *self.shape[2:])) if self.either_order else (self.shape,)
 
     def __post_init__(self) -> None:
         if self.shape is not None:

@@ -8,7 +8,7 @@ from armem_bridge.long_term.gate import Gate
 from armem_bridge.long_term.mapping import arrival_of, snapshot_of, snapshot_uid
 from armem_bridge.long_term.poses import FrameTransform, PosePath
 from armem_bridge.long_term.recall import recall_snapshots, snapshots_cue
-from armem_bridge.long_term.robot_place import LocationPort, RobotPlaces
+from armem_bridge.long_term.robot_place import LocationPort, PoseListener, RobotPlaces
 from armem_bridge.long_term.settings import Consolidation, When
 from armem_bridge.long_term.source import LongTermSource
 from armem_bridge.long_term.subjects import SubjectFinder
@@ -21,6 +21,7 @@ __all__ = [
     "LocationPort",
     "LongTermMemory",
     "LongTermSource",
+    "PoseListener",
     "PosePath",
     "RobotPlaces",
     "SubjectFinder",

@@ -11,7 +11,7 @@ from threading import Condition
 from armem_bridge.aron.type_objects import TypeObject
 from armem_bridge.long_term.catalogue import names_below
 from armem_bridge.long_term.listed_history import ListedHistory
-from armem_bridge.long_term.refusals import BacklogFull
+from armem_bridge.long_term.refusals import ArchiveClosed, BacklogFull
 from armem_bridge.memory_id import MemoryID
 from armem_bridge.working.access_statistics import Usage
 from armem_bridge.working.admission import size_of
@@ -52,6 +52,7 @@ class Backlog:
         self.limit = limit
         self.byte_limit = byte_limit
         self.bytes = 0
+        self._closed = False
         self._changed = Condition()
         self._numbers = count(1)
         self._waiting: dict[int, Waiting] = {}
@@ -79,14 +80,27 @@ class Backlog:
     # Coming
 
     def put(self, given: Sequence[Waiting]) -> None:
-        """Take these in, over the limit too: who can wait does so by `wait_for_room` before."""
+        """Take these in, over the limit too. `ArchiveClosed` once it was closed: nobody would empty it any more."""
         with self._changed:
+            if self._closed:
+                raise ArchiveClosed("long-term memory was closed meanwhile and takes nothing more: make a new one")
             for each in given:
                 each.number = next(self._numbers)
                 self._waiting[each.number] = each
                 self._entities.setdefault(each.snapshot.id.entity_id, {})[each.number] = each
                 self.bytes += each.size
             self._changed.notify_all()
+
+    def put_in_time(self, given: Sequence[Waiting], timeout: float, why: Callable[[], str]) -> None:
+        """Take these in as soon as they fit, and nobody between; `BacklogFull` when that takes too long."""
+        with self._changed:
+            self.wait_for_room(len(given), timeout, why)
+            self.put(given)
+
+    def close(self) -> None:
+        """Take nothing more; what waits goes on waiting."""
+        with self._changed:
+            self._closed = True
 
     def wait_for_room(self, number: int, timeout: float, why: Callable[[], str]) -> None:
         """Wait until `number` more fit in, or nothing else waits; `BacklogFull` when that takes too long."""

@@ -8,7 +8,7 @@ from threading import Lock
 from typing import Final
 
 from armem_bridge.long_term.mapping import ID, below
-from armem_bridge.memory_id import MemoryID
+from armem_bridge.memory_id import InvalidMemoryID, Level, MemoryID
 from elm.app import Memory
 from elm.errors import MemoryMissing
 from elm.store import ByFeature
@@ -69,7 +69,7 @@ class Catalogue:
             groups = self._memory.recall(below(MemoryID())).groups(ByFeature(name=ID))
         except MemoryMissing:
             return set()
-        return {MemoryID.parse(group.key) for group in groups if isinstance(group.key, str)}
+        return {found for group in groups if (found := _entity(group.key)) is not None}
 
     def _forgotten_so_far(self) -> tuple[int, int]:
         """What changes with every forgetting: how many there were, and of how many events."""
@@ -78,3 +78,14 @@ class Catalogue:
         except MemoryMissing:
             return (0, 0)
         return len(runs), sum(run.events for run in runs)
+
+
+def _entity(text: object) -> MemoryID | None:
+    """The entity of that text. Events of others in the memory may say anything there: what names none is none."""
+    if not isinstance(text, str):
+        return None
+    try:
+        found = MemoryID.parse(text)
+    except InvalidMemoryID:
+        return None
+    return found if found.level is Level.ENTITY else None

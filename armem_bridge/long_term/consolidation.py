@@ -17,15 +17,15 @@ from armem_bridge.long_term.event_types import SegmentTypes, types_of
 from armem_bridge.long_term.gate import Gate, OpenGate, RememberingGate
 from armem_bridge.long_term.health import Health
 from armem_bridge.long_term.refusals import ArchiveClosed, NotConsolidated
-from armem_bridge.long_term.robot_place import LocationPort
+from armem_bridge.long_term.robot_place import LocationPort, PoseListener
 from armem_bridge.long_term.settings import Consolidation, When
-from armem_bridge.long_term.source import LongTermSource
+from armem_bridge.long_term.source import LAST, LongTermSource
 from armem_bridge.long_term.subjects import SubjectFinder
 from armem_bridge.long_term.writing import UNAVAILABLE, EventWriter, SetAside
 from armem_bridge.memory_id import Level
 from armem_bridge.moments import Clock, now
 from armem_bridge.working.access_statistics import Usage
-from armem_bridge.working.archive import Evicted
+from armem_bridge.working.archive import Evicted, NotKept
 from armem_bridge.working.history import Source
 from armem_bridge.working.server import MemoryServer
 from armem_bridge.working.snapshot import Snapshot
@@ -43,6 +43,11 @@ GLANCE: Final = 0.02
 STOP_TIMEOUT: Final = 30.0
 """So many seconds `close` waits for what still waits to be consolidated, unless told otherwise."""
 
+_BEYOND: Final = (
+    "its reference time is beyond the year 9999, where long-term memory has no times: "
+    "give the time that the data are about, in microseconds since 1970"
+)
+
 _logger = logging.getLogger(__name__)
 
 
@@ -52,7 +57,8 @@ class LongTermMemory:
     With the usual settings a commit is acknowledged when it waits in the backlog, which a thread empties
     into elm in batches; then it is durable. `agent` is the robot, `location` says where it was, `subjects`
     where the things are that the data are about; `gate` decides what is kept of what leaves working memory,
-    where only that is consolidated. `on_set_aside` is told of every snapshot that cannot be kept.
+    where only that is consolidated. A `location` that is a `PoseListener` is told of all that is committed
+    to those servers, and so of the robot's own poses. `on_set_aside` is told of every snapshot that cannot be kept.
 
     Tell it which servers it is behind (`serve`), and `close` it after them: that empties the backlog.
     """
@@ -72,6 +78,7 @@ class LongTermMemory:
         self.memory = memory
         self.settings = settings if settings is not None else Consolidation()
         self._location = location
+        self._poses = location if isinstance(location, PoseListener) else None
         self._gate = RememberingGate(gate if gate is not None else OpenGate())
         self._on_set_aside = on_set_aside
         self._clock = clock
@@ -100,10 +107,17 @@ class LongTermMemory:
     def consolidate(self, snapshots: Sequence[Snapshot]) -> None:
         """Take every version that a commit brought.
 
-        `BacklogFull` after `wait` seconds without room. Durable ones are in elm when this returns;
-        `NotConsolidated` where that cannot be had in time, and other errors where one of them cannot be kept.
+        `NotKept` where elm has no times for some of them. `BacklogFull` after `wait` seconds without room.
+        Durable ones are in elm when this returns; `NotConsolidated` where that cannot be had in time, and
+        other errors where one of them cannot be kept.
         """
         self._check_open()
+        beyond = {index: _BEYOND for index, snapshot in enumerate(snapshots) if snapshot.referenced > LAST}
+        if beyond:
+            raise NotKept(beyond)
+        if self._poses is not None:
+            # Before anything is consolidated that came after them, also where working memory keeps none for long.
+            self._poses.note(snapshots)
         if self.settings.when is When.ON_EVICTION:
             self._backlog.wait_for_room(len(snapshots), self.settings.wait, self._health.why_slow)
         elif self.settings.durable:
@@ -113,8 +127,7 @@ class LongTermMemory:
             waiting = [
                 Waiting(snapshot=snapshot, aron_type=self._type_of(snapshot), moment=moment) for snapshot in snapshots
             ]
-            self._backlog.wait_for_room(len(waiting), self.settings.wait, self._health.why_slow)
-            self._backlog.put(waiting)
+            self._backlog.put_in_time(waiting, self.settings.wait, self._health.why_slow)
 
     def on_eviction(self, evicted: Sequence[Evicted]) -> None:
         """Take what leaves working memory, where that is what is consolidated; written through it is here already."""
@@ -170,6 +183,7 @@ class LongTermMemory:
         ends, and what waits then is lost to long-term memory. Closing can be tried again meanwhile.
         """
         self._closed = True
+        self._backlog.close()
         if not self.flush(timeout):
             raise NotConsolidated(
                 f"{len(self._backlog):,} snapshots are not durable after {timeout:g} s ({self._health.why_slow()}): "

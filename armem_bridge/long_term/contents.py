@@ -16,7 +16,7 @@ def memory_names(elm: Memory) -> Sequence[str]:
     """The names of the memories that something was consolidated of."""
     try:
         groups = elm.recall(below(MemoryID())).groups(ByFeature(name=MEMORY))
-        return sorted(group.key for group in groups if isinstance(group.key, str))
+        return sorted(group.key for group in groups if isinstance(group.key, str) and group.key)
     except MemoryMissing:
         # It comes to be when something is written to it.
         return ()

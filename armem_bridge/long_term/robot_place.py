@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from threading import Lock
-from typing import Final, Protocol
+from typing import Final, Protocol, runtime_checkable
 
 import numpy as np
 from shapely.geometry import Polygon
@@ -12,9 +12,6 @@ from sortedcontainers import SortedDict
 
 from armem_bridge.long_term.poses import NoPose, Pose, PosePath, read_pose
 from armem_bridge.long_term.refusals import InvalidArchive
-from armem_bridge.memory_id import MemoryID
-from armem_bridge.working.notifications import Subscription
-from armem_bridge.working.server import MemoryServer
 from armem_bridge.working.snapshot import Snapshot, snapshot_hash
 from elm.errors import InvalidValue
 from elm.geometry import DEFAULT_FRAME, Region
@@ -33,13 +30,22 @@ class LocationPort(Protocol):
         """The robot's footprint at a time, None where it is not known; that is never the same as at (0, 0)."""
 
 
+@runtime_checkable
+class PoseListener(Protocol):
+    """A location that learns where the robot was from snapshots of its state; any thread may tell it."""
+
+    def note(self, snapshots: Iterable[Snapshot]) -> None:
+        """These versions were committed; whether long-term memory takes them is not decided yet."""
+
+
 class RobotPlaces:
     """A `LocationPort` over the poses that snapshots of a robot's state have.
 
     The robot is where its last pose at or before a time said, if that is at most `max_age` microseconds
     older. `pose` says where it stands in the data and in which unit, and with `pose.segment` in which
-    snapshots. `footprint` is a radius in metres, or the corners of a polygon around the robot's origin with
-    x ahead. The last `limit` poses by time are remembered.
+    snapshots; `note` tells of them, which `LongTermMemory` does. `footprint` is a radius in metres, or the
+    corners of a polygon around the robot's origin with x ahead. The last `limit` poses by time are
+    remembered.
     """
 
     def __init__(
@@ -88,15 +94,6 @@ class RobotPlaces:
                     self._places[snapshot.referenced] = (version, region)
                 if len(self._places) > self._limit:
                     self._places.popitem(0)
-
-    def follow(self, server: MemoryServer) -> Subscription:
-        """Remember the poses that are committed to a memory server from now on, until the subscription is closed."""
-
-        def heard(updated: Sequence[MemoryID]) -> None:
-            found = [server.get(each) for each in updated]
-            self.note([each for each in found if each is not None])
-
-        return server.subscribe(heard, self._path.segment)
 
     def region(self, moment: int) -> Region | None:
         with self._lock:

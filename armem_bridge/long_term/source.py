@@ -59,7 +59,7 @@ class LongTermSource:
             return names_below(parent, self._catalogue.entities())
         by = ByFeature(name=_FEATURES[parent.level])
         groups = _unless_missing(lambda: self._memory.recall(below(parent)).groups(by), list[Group]())
-        return sorted(group.key for group in groups if isinstance(group.key, str))
+        return sorted(group.key for group in groups if isinstance(group.key, str) and group.key)
 
     def knows(self, name: MemoryID) -> bool:
         return _unless_missing(lambda: self._memory.recall(below(name)).exists(), False)

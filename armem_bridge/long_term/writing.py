@@ -46,7 +46,6 @@ UNAVAILABLE: Final = (
 ATTEMPTS: Final = 5
 """A snapshot that the database fails to write so often, by itself, is set aside: others wait behind it."""
 
-
 _COUNTED: Final = ("consolidated", "repeated", "without_region", "place_failures")
 
 _logger = logging.getLogger(__name__)
@@ -126,7 +125,9 @@ class EventWriter:
             _give_up(ready[0][0], error, aside)
             done([ready[0][0]])
             return
-        self._count(consolidated=report.new, repeated=report.existing)
+        # Not when they are made: that is done again as often as the database has to be asked.
+        nowhere = sum(arrival.event.region is None for _, arrival in ready)
+        self._count(consolidated=report.new, repeated=report.existing, without_region=nowhere)
         for refusal in report.refused:
             waiting, arrival = ready[refusal.index]
             if arrival.event.uid in known:
@@ -152,7 +153,8 @@ class EventWriter:
             written = self._commit([arrivals[each] for each in arrivals if each in fresh])
         self._catalogue.add(snapshot.id.entity_id for snapshot, _ in given)
         new = sum(each.new for each in written)
-        self._count(consolidated=new, repeated=len(arrivals) - new)
+        nowhere = sum(arrival.event.region is None for arrival in arrivals.values())
+        self._count(consolidated=new, repeated=len(arrivals) - new, without_region=nowhere)
 
     def _commit(self, arrivals: Sequence[Arrival]) -> list[Committed]:
         store = self._memory.store
@@ -160,13 +162,10 @@ class EventWriter:
 
     def _arrival(self, snapshot: Snapshot, aron_type: TypeObject | None) -> Arrival:
         location, subjects = self._location, self._subjects
-        region = self._place(lambda: location.region(snapshot.referenced)) if location is not None else None
-        if region is None:
-            self._count(without_region=1)
         return arrival_of(
             snapshot,
             event_type=self._types.of(snapshot.id, aron_type),
-            region=region,
+            region=self._place(lambda: location.region(snapshot.referenced)) if location is not None else None,
             subject=self._place(lambda: subjects.subject(snapshot)) if subjects is not None else None,
             agent=self._agent,
         )
@@ -193,9 +192,7 @@ class EventWriter:
     def status(self) -> Mapping[str, object]:
         """What was written so far, and what could not be told of it."""
         with self._lock:
-            counted = {
-                name: self._counts[name] for name in ("consolidated", "repeated", "without_region", "place_failures")
-            }
+            counted = {name: self._counts[name] for name in _COUNTED}
         return {
             **counted,
             "type_contradictions": self._types.contradictions,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from armem_bridge.working.archive import Archive, Evicted
+from armem_bridge.working.archive import Archive, Evicted, NotKept
 from armem_bridge.working.builder import QueryBuilder
 from armem_bridge.working.commit import Commit, CommitResult, EntityUpdate, UpdateResult
 from armem_bridge.working.metadata import Metadata
@@ -26,6 +26,7 @@ __all__ = [
     "Memory",
     "MemoryServer",
     "Metadata",
+    "NotKept",
     "ProviderSegment",
     "Query",
     "QueryBuilder",

@@ -56,8 +56,11 @@ def _about_times(update: EntityUpdate) -> str:
             f"the update of {update.entity} has no valid referenced time ({update.referenced!r:.80}): give the time "
             f"that the data are about, in microseconds since 1970"
         )
-    if type(update.sent) is not int:
-        return f"the sent time of the update of {update.entity} is an integer, not {update.sent!r:.80}: -1 is none"
+    if type(update.sent) is not int or update.sent > GREATEST:
+        return (
+            f"the sent time of the update of {update.entity} is an integer of 64 bits, "
+            f"not {update.sent!r:.80}: -1 is none"
+        )
     return ""
 
 

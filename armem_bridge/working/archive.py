@@ -7,6 +7,7 @@ from typing import Protocol
 
 import msgspec
 
+from armem_bridge.errors import ArmemError
 from armem_bridge.working.access_statistics import Usage
 from armem_bridge.working.history import Source
 from armem_bridge.working.snapshot import Snapshot
@@ -19,13 +20,25 @@ class Evicted(msgspec.Struct, frozen=True, kw_only=True):
     usage: Usage
 
 
+class NotKept(ArmemError, ValueError):
+    """An archive can never keep some of the snapshots it was given. Correct those, and give it the others again."""
+
+    def __init__(self, refused: Mapping[int, str]) -> None:
+        if not refused:
+            raise ValueError("an archive that keeps everything has nothing to refuse")
+        super().__init__("; ".join(sorted(set(refused.values()))))
+        self.refused = dict(refused)
+        """The reasons, by the positions in what it was given; of all that nothing was taken."""
+
+
 class Archive(Protocol):
     """Long-term memory, as a memory server sees it. One archive may serve several memories."""
 
     def consolidate(self, snapshots: Sequence[Snapshot]) -> None:
         """Every version that a commit brought, before it is in working memory and before it is acknowledged.
 
-        May wait, for durability or for room. An error refuses the updates: nothing of them is inserted.
+        May wait, for durability or for room. An error refuses the updates: nothing of them is inserted. With
+        `NotKept` only those that it names are refused, and this is called again with the others.
         """
 
     def on_eviction(self, evicted: Sequence[Evicted]) -> None:

@@ -13,16 +13,17 @@ from armem_bridge.memory_id import MemoryID
 from armem_bridge.moments import Clock, now
 from armem_bridge.working.access_statistics import Usage
 from armem_bridge.working.admission import why_no_segment, why_of_another_type, why_refused
-from armem_bridge.working.archive import Archive, Evicted
+from armem_bridge.working.archive import Archive, Evicted, NotKept
 from armem_bridge.working.commit import Commit, CommitResult, EntityUpdate, UpdateResult
 from armem_bridge.working.counters import Counters
+from armem_bridge.working.door import Door
 from armem_bridge.working.evaluation import evaluate
 from armem_bridge.working.history import Source
 from armem_bridge.working.limits import HistoryLimits
 from armem_bridge.working.notifications import QUEUE_LIMIT, Listener, Notifier, Subscription
 from armem_bridge.working.prior_knowledge import load_prior_knowledge
 from armem_bridge.working.query import Query, QueryTarget
-from armem_bridge.working.refusals import InvalidServer, ServerClosed
+from armem_bridge.working.refusals import InvalidServer
 from armem_bridge.working.segments import AddSegment, CoreSegmentDefinition, SegmentResult
 from armem_bridge.working.snapshot import Snapshot
 from armem_bridge.working.status import ServerStatus
@@ -70,7 +71,7 @@ class MemoryServer:
         self._update_bytes = update_bytes
         self._notifier = Notifier()
         self._counters = Counters(delay_threshold)
-        self._closed = False
+        self._door = Door(f"the memory server {name!r:.80} was closed: make a new one")
         for path in prior_knowledge:
             load_prior_knowledge(path, self._memory, arrived=clock())
 
@@ -93,8 +94,8 @@ class MemoryServer:
         core segment's, another type for a segment that has entities, and changes of prior knowledge. That
         the segment exists already is no fault.
         """
-        self._check_open()
-        return tuple(map(self._add_segment, wishes))
+        with self._door:
+            return tuple(map(self._add_segment, wishes))
 
     def commit(self, commit: Commit) -> CommitResult:
         """Make the updates of a commit; one result for each, in their order.
@@ -105,7 +106,10 @@ class MemoryServer:
         one counts that `snapshot.supersedes` says; the update that brought the other one succeeds too, for
         the archive keeps both. Listeners get one message with the IDs of all updates that were made.
         """
-        self._check_open()
+        with self._door:
+            return self._commit(commit)
+
+    def _commit(self, commit: Commit) -> CommitResult:
         arrived = self._clock()
         generation = self._memory.generation
         outcomes = [self._admit(update, arrived) for update in commit.updates]
@@ -164,8 +168,8 @@ class MemoryServer:
         It is called in a thread of its own, after the commit. Where it is too slow the oldest messages of
         its queue are dropped; where it raises, the status says so, and it is called again the next time.
         """
-        self._check_open()
-        return self._notifier.subscribe(listener, subscribed, queue_limit)
+        with self._door:
+            return self._notifier.subscribe(listener, subscribed, queue_limit)
 
     # Looking after it
 
@@ -192,8 +196,11 @@ class MemoryServer:
         )
 
     def close(self) -> None:
-        """Take no more commits, and end all subscriptions; what is there can still be read."""
-        self._closed = True
+        """Take no more commits, and end all subscriptions; what is there can still be read.
+
+        Returns when the commits that are going on are over, so that an archive may be closed next.
+        """
+        self._door.close()
         self._notifier.close()
 
     def __enter__(self) -> Self:
@@ -205,10 +212,6 @@ class MemoryServer:
         self.close()
 
     # Inside
-
-    def _check_open(self) -> None:
-        if self._closed:
-            raise ServerClosed(f"the memory server {self.name!r:.80} was closed: make a new one")
 
     def _check_limited(self, where: MemoryID) -> None:
         if where.memory not in ("", self.name) or (
@@ -244,6 +247,12 @@ class MemoryServer:
             return outcomes
         try:
             self._archive.consolidate(snapshots)
+        except NotKept as error:
+            places = [place for place, outcome in enumerate(outcomes) if isinstance(outcome, Snapshot)]
+            corrected = list(outcomes)
+            for index, why in error.refused.items():
+                corrected[places[index]] = f"{snapshots[index].id} cannot be kept: {why}"
+            return self._consolidate(corrected)
         except Exception as error:
             # A memory that promises to keep what it acknowledges does not acknowledge what it cannot keep.
             _logger.exception("the archive of the memory %s did not take %d snapshots", self.name, len(snapshots))

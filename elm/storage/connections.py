@@ -47,7 +47,7 @@ _SESSION = {
 WRITING = {"plan_cache_mode": "force_generic_plan"}
 # A recall's best plan depends on the cue's values, and starting parallel workers costs more than they save.
 RECALLING = {"plan_cache_mode": "force_custom_plan", "max_parallel_workers_per_gather": "0"}
-# But for events asked for one by one there is one good plan, and making it anew costs several times what running it does.
+# But for events asked for one by one there is one good plan, and to make it anew costs more than to run it.
 NAMING = {**RECALLING, "plan_cache_mode": "force_generic_plan"}
 
 # Decoded by elm, when somebody looks: until then the bytes as they came.

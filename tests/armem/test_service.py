@@ -14,10 +14,11 @@ import pytest
 from armem_bridge.aron.conversion import to_aron
 from armem_bridge.aron.data import Dict
 from armem_bridge.config import InvalidConfiguration, read_config
-from armem_bridge.forgetting import Frequency
+from armem_bridge.forgetting import Frequency, Retention
 from armem_bridge.forgetting.forgetter import Forgetter
 from armem_bridge.long_term import LongTermMemory, recall_snapshots
 from armem_bridge.long_term.contents import entities, memory_names
+from armem_bridge.long_term.refusals import NotConsolidated
 from armem_bridge.long_term_forgetting import LongTermForgetting, plan_forgetting
 from armem_bridge.memory_id import MemoryID
 from armem_bridge.moments import to_datetime
@@ -27,11 +28,13 @@ from armem_bridge.service import Service, ServiceClosed, connect_client
 from armem_bridge.working import Commit, EntityUpdate, MemoryServer, QueryBuilder, QueryTarget
 from armem_bridge.working.refusals import InvalidPriorKnowledge, InvalidServer, ServerClosed
 from elm import cues
-from elm.app import connect
+from elm.app import Memory, connect
+from elm.event import Event
 from elm.geometry import Region
 from elm.recognition import Timing
 from elm.recognizers import Pattern, step
 from tests.armem.long_term.memories import in_process
+from tests.armem.long_term.test_source import HeldStore
 from tests.servers import Server
 
 BEGIN = 1_767_261_600_000_000
@@ -155,6 +158,21 @@ def test_online_forgetting_stands_between(starting: Starting) -> None:
         assert service.status().long_term["forgotten"] == 3
 
 
+def test_stopping_can_be_tried_again_when_the_database_is_back(
+    starting: Starting, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store = HeldStore()
+    monkeypatch.setattr("elm.app.connect", lambda *_: Memory(store))
+    service = starting(SERVING).start()
+    commit(service, placed(CUP, 0, 1.0, 1.0))
+    with pytest.raises(NotConsolidated, match="1 snapshots are not durable"):
+        service.stop(timeout=0.05)
+    store.go.set()
+    service.stop()
+    assert service.status().long_term["consolidated"] == 1
+    assert service.status().long_term["backlog"] == 0
+
+
 def test_what_was_consolidated_is_there_after_a_restart(starting: Starting, postgres_server: Server) -> None:
     with postgres_server.database() as dsn:
         text = SERVING.replace("memory://", dsn)
@@ -199,6 +217,23 @@ def test_forgetting_takes_every_version_and_leaves_other_snapshots_alone() -> No
     assert port.forget([CUP.with_timestamp(BEGIN), CUP.with_timestamp(BEGIN + 1)]) == 1
     assert (port.events, port.held) == (2, 0)
     assert [each.referenced for each in recall_snapshots(memory)] == [BEGIN + 5_000_000]
+
+
+def test_forgetting_leaves_the_events_of_others_alone() -> None:
+    """Also those that name an entity, at the time of a snapshot that goes."""
+    segments = [segment.definition() for segment in PROFILES["ObjectMemory"].core_segments]
+    memory = in_process()
+    with LongTermMemory(memory) as archive, MemoryServer("Object", segments, archive=archive) as server:
+        assert server.commit(Commit(updates=[placed(CUP, second, 1.0, 1.0) for second in range(3)])).success
+    memory.add_type("Grasp")
+    seen = next(iter(memory.recall(limit=1)))
+    memory.commit(Event(type="Grasp", interval=seen.interval, features=[*seen.features, ("hand", "left")]))
+
+    plan = plan_forgetting(memory, [Retention(count=1)], now=BEGIN)
+    port = LongTermForgetting(memory)
+    assert Forgetter(port).apply(plan).forgotten == port.events == 2
+    assert next(iter(memory.recall())).type == "Grasp"
+    assert memory.recall().count() == 2
 
 
 def test_what_recognizers_hold_is_not_forgotten_yet() -> None:

@@ -15,7 +15,7 @@ import pytest
 from psycopg import sql
 
 from elm import cues
-from elm.errors import ForgottenEvent, StoreFailure, UnknownEvent
+from elm.errors import DatabaseUnfit, ForgottenEvent, StoreFailure, UnknownEvent
 from elm.event import Event
 from elm.forgetting import forget
 from elm.storage import forgetting_statements, migrate
@@ -24,6 +24,7 @@ from elm.storage.postgres import PostgresStore
 from elm.storage.tables import REVISION
 from elm.store import Arrival, Closed, Query, Store
 from elm.taxonomy import EventType
+from elm.tombstone import Tombstone
 from tests.clock import at, span
 from tests.servers import MEMORY
 from tests.storage.test_concurrency import WAYS, WRITERS, Robots, arrivals, at_once, going_on, whole
@@ -74,11 +75,13 @@ WHERE NOT EXISTS (
 )
 """
 _USELESS = "SELECT count(*) FROM tombstone t WHERE NOT EXISTS (SELECT FROM part WHERE part_id = t.id)"
+BROKEN = (_DANGLING, _UNLINKED, _USELESS)
+"""What there must be none of: links that lead nowhere, parts without a link, tombstones that are parts of nothing."""
 
 
 def check_whole(robots: Robots) -> None:
     """No link leads nowhere, every part of every event is linked, and every tombstone is a part."""
-    for query in (_DANGLING, _UNLINKED, _USELESS):
+    for query in BROKEN:
         assert robots._ask(query) == 0, query
 
 
@@ -134,6 +137,27 @@ def test_whole_written_while_its_part_is_forgotten(
     check_whole(robots)
 
 
+@pytest.mark.parametrize("write", WAYS, ids=["commit", "commit_all", "load"])
+def test_whole_with_extents_written_among_many_while_its_part_is_forgotten(
+    robots: Robots, threads: ThreadPoolExecutor, write: Callable[..., object]
+) -> None:
+    """Its extents agree with what is a tombstone by the time that the lock is had."""
+    part, last = ended(), ended(2)
+    robots.store.commit_all(arrivals(part, last, whole(part, last)))
+    forget(robots.store, [last.uid])
+    over = Event(type="Thing", interval=span(0, 1), parts=[part.uid])
+    second = robots.another()
+    with robots.stopped_at("forgetting"):
+        forgetting = threads.submit(forget, robots.store, [part.uid])
+        robots.wait_for_locks(forgetting)
+        writing = threads.submit(write, second, *(ended() for _ in range(20)), over)
+        robots.wait_for_locks(forgetting, writing)
+    assert forgetting.result().tombstones == 1
+    writing.result()
+    assert over.uid in uids(second)
+    check_whole(robots)
+
+
 def test_whole_written_while_the_last_whole_of_its_tombstone_is_forgotten(
     robots: Robots, threads: ThreadPoolExecutor, write: Callable[..., object]
 ) -> None:
@@ -185,6 +209,26 @@ def test_an_event_beside_its_tombstone_is_the_part_of_new_wholes(
     write(robots.store, over, *(ended() for _ in range(20)))
     (found,) = robots.store.find(Query(cue=cues.uid(over.uid)))
     assert found.interval == span(5, 6)
+
+
+@pytest.mark.parametrize("later", [False, True], ids=["before it", "behind it"])
+def test_an_event_beside_its_tombstone_is_forgotten_into_it(robots: Robots, dsn: str, later: bool) -> None:
+    part, other = ended(), ended()
+    over, beside = whole(part), whole(other)
+    robots.store.commit_all(arrivals(*([other, part] if later else [part, other]), over, beside))
+    forget(robots.store, [part.uid])
+    with psycopg.connect(dsn, options=f"-c search_path={MEMORY}") as connection:
+        connection.execute("UPDATE tombstone SET uid = %s", [other.uid])
+        connection.execute("UPDATE event SET parts = ARRAY[%s] WHERE uid = %s", [other.uid, over.uid])
+    assert forget(robots.store, [other.uid]).tombstones == 1
+    assert {each.uid for each in robots.store.find(Query(cue=cues.parts("equal", [other.uid])))} == {
+        over.uid,
+        beside.uid,
+    }
+    check_whole(robots)
+    assert forget(robots.store, [over.uid]).dissolved == 0
+    assert forget(robots.store, [beside.uid]).dissolved == 1
+    check_whole(robots)
 
 
 # Closing
@@ -243,6 +287,67 @@ def test_writers_at_work_are_waited_for_before_the_first_tombstone(robots: Robot
     with pytest.raises(ForgottenEvent):
         second.commit_all(arrivals(part, *(ended() for _ in range(20))))
     assert second.commit(Arrival(event=whole(part))).new
+
+
+def test_tombstones_of_another_memory_wait_for_writers_at_work_too(robots: Robots, threads: ThreadPoolExecutor) -> None:
+    """Also where a forgetting has begun to wait before."""
+    part = ended()
+    robots.store.commit_all(arrivals(part, whole(part)))
+    first, second, third = (robots.another() for _ in range(3))
+    given = Tombstone(uid=uuid4(), interval=span(0, 1), run=uuid4())
+    with robots.stopped_at("log_inbox"):
+        writing = threads.submit(third.commit, Arrival(event=ended()))
+        robots.wait_for_locks(writing)
+        forgetting = threads.submit(forget, first, [part.uid])
+        robots.wait_for_locks(writing, forgetting)
+        keeping = threads.submit(second.keep_tombstones, [given])
+        robots.wait_for_locks(writing, forgetting, keeping)
+        assert tombstones(robots.store) == set()
+    assert forgetting.result().tombstones == keeping.result().new == 1
+    assert tombstones(robots.store) == {part.uid, given.uid}
+
+
+def test_who_forgets_after_one_that_was_killed_before_it_had_waited_waits(
+    robots: Robots, threads: ThreadPoolExecutor, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    part = ended()
+    robots.store.commit_all(arrivals(part, whole(part)))
+    second = robots.another()
+    with robots.stopped_at("log_inbox"):
+        writing = threads.submit(second.commit, Arrival(event=ended()))
+        robots.wait_for_locks(writing)
+        with monkeypatch.context() as killed:
+            killed.setattr(forgetting_statements, "WAIT_FOR_WRITERS", "SELECT 1 / 0")
+            with pytest.raises(StoreFailure):
+                forget(robots.store, [part.uid])
+        forgetting = threads.submit(forget, robots.store, [part.uid])
+        robots.wait_for_locks(writing, forgetting)
+    assert forgetting.result().tombstones == 1
+
+
+def test_who_may_not_admit_the_first_tombstone_is_told_who_may(dsn: str, robots: Robots) -> None:
+    part = ended()
+    robots.store.commit_all(arrivals(part, whole(part)))
+    # Roles belong to the whole server.
+    robot = f"robot_{uuid4().hex}"
+    with psycopg.connect(dsn, autocommit=True) as connection:
+        for statement in (
+            "CREATE ROLE {0}",
+            "GRANT ALL ON SCHEMA {1} TO {0}",
+            "GRANT ALL ON ALL TABLES IN SCHEMA {1} TO {0}",
+            "GRANT ALL ON ALL SEQUENCES IN SCHEMA {1} TO {0}",
+        ):
+            connection.execute(sql.SQL(statement).format(sql.Identifier(robot), sql.Identifier(MEMORY)))
+        store = PostgresStore(psycopg.conninfo.make_conninfo(dsn, options=f"-c role={robot}"), MEMORY)
+        try:
+            with pytest.raises(DatabaseUnfit, match="as that user once"):
+                forget(store, [part.uid])
+            assert uids(store) >= {part.uid}
+            forget(robots.store, [part.uid])
+            assert forget(store, cues.everything()).events == 1
+        finally:
+            store.close()
+            connection.execute(sql.SQL("DROP OWNED BY {0}; DROP ROLE {0}").format(sql.Identifier(robot)))
 
 
 def test_many_forget_at_once(robots: Robots, threads: ThreadPoolExecutor) -> None:

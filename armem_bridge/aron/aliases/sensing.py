@@ -12,13 +12,13 @@ COLOR_HSV: Final = t.Object(name="ColorHSV", members={"h": t.Int(), "s": t.Int()
 
 
 def image_rgb(width: int | None = None, height: int | None = None) -> t.NDArray:
-    """An image of width x height pixels with three channels of 8 bits; OpenCV's type 16 is one too."""
-    return t.NDArray(shape=(width, height, 3), element="uint8")
+    """An image of width x height pixels, in either order, with three channels of 8 bits; OpenCV's 16 is one too."""
+    return t.NDArray(shape=(width, height, 3), element="uint8", either_order=width != height)
 
 
 def image_depth(width: int | None = None, height: int | None = None) -> t.NDArray:
-    """An image of width x height depths as float32, with or without an extent of 1 for the channel."""
-    return t.NDArray(shape=(width, height, 1), element="float32")
+    """An image of width x height depths, in either order, as float32, with or without an extent of 1 for a channel."""
+    return t.NDArray(shape=(width, height, 1), element="float32", either_order=width != height)
 
 
 POINTS: Final = (

@@ -16,10 +16,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import armem_bridge.aron.type_objects as t
+from armem_bridge.aron.aliases.sensing import image_depth, image_rgb
 from armem_bridge.aron.arrays import PLAIN, STRUCTURED, channels, from_numpy, to_numpy
 from armem_bridge.aron.conversion import to_aron, to_python
 from armem_bridge.aron.data import DEPTH_LIMIT, Bool, Data, Dict, Double, Float, Int, List, Long, NDArray, String
-from armem_bridge.aron.realization import realizes
+from armem_bridge.aron.realization import Level, realizes
 from armem_bridge.aron.records import from_aron
 from armem_bridge.errors import ArmemError, InvalidData, NotConvertible, NotRealized
 from tests.armem.aron.strategies import DATA, INT64, NAMES, TEXTS, TYPES, realizing
@@ -381,3 +382,11 @@ def test_annotations_that_say_nothing_are_refused() -> None:
         from_aron(Dict({"y": Int(1)}), Odd)
     with pytest.raises(NotConvertible, match="no dataclass"):
         from_aron(Int(1), int)
+
+
+def test_images_of_numpy_are_of_the_type_that_armarx_gives() -> None:
+    wanted = t.Object(name="Seen", members={"image": image_rgb(4, 2), "depth": image_depth(4, 2)})
+    seen = to_aron({"image": np.zeros((2, 4, 3), np.uint8), "depth": np.zeros((2, 4), np.float32)}, wanted)
+    assert realizes(seen, wanted).level is Level.FULL
+    with pytest.raises(NotConvertible, match=r"\[2, 5, 3\] is no NDArray of \[4, 2, 3\] in either order uint8"):
+        to_aron({"image": np.zeros((2, 5, 3), np.uint8)}, wanted)

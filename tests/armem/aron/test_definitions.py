@@ -33,8 +33,8 @@ EXPECTED = {
     "4.6": t.Object(
         name="example::dto::Vision",
         members={
-            "image_rgb": t.NDArray(shape=(1920, 1080, 3), element="uint8"),
-            "image_depth": t.NDArray(shape=(1920, 1080, 1), element="float32"),
+            "image_rgb": t.NDArray(shape=(1920, 1080, 3), element="uint8", either_order=True),
+            "image_depth": t.NDArray(shape=(1920, 1080, 1), element="float32", either_order=True),
         },
     ),
     "4.7": t.Object(

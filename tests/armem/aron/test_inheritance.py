@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import armem_bridge.aron.type_objects as t
+from armem_bridge.aron.aliases.sensing import image_rgb
 from armem_bridge.aron.data import Data
 from armem_bridge.aron.inheritance import faults, is_base_of
 from armem_bridge.aron.realization import parts_of, realizes
@@ -65,6 +66,11 @@ SIDES = t.IntEnum(name="Side", values={"L": 0, "R": 1})
         (t.NDArray(shape=(4, 4), element="float32"), t.NDArray(), False),
         (t.NDArray(shape=(None, None, 3)), t.NDArray(shape=(1920, 1080, 3), element="uint8"), True),
         (t.NDArray(shape=(1920, 1080, 3)), t.NDArray(shape=(None, None, 3)), False),
+        (image_rgb(640, 480), t.NDArray(shape=(480, 640, 3), element="uint8"), True),
+        (image_rgb(), image_rgb(640, 480), True),
+        (image_rgb(640, 480), image_rgb(480, 640), True),
+        (t.NDArray(shape=(640, 480, 3), element="uint8"), image_rgb(640, 480), False),
+        (image_rgb(640, 480), t.NDArray(shape=(480, 480, 3), element="uint8"), False),
         (t.NDArray(element="float"), t.NDArray(element="float32"), True),
         (t.NDArray(element="float"), t.NDArray(element="double"), False),
         (t.NDArray(element="float"), t.NDArray(), False),

@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import armem_bridge.aron.type_objects as t
+from armem_bridge.aron.aliases.sensing import image_depth, image_rgb
 from armem_bridge.aron.data import Bool, Data, Dict, Double, Float, Int, List, Long, NDArray, String
 from armem_bridge.aron.introspection import infer
 from armem_bridge.aron.realization import Level, fits, realizes, show_path
@@ -144,6 +145,16 @@ def array(*shape: int, element: str) -> NDArray:
         (array(2, 4, element="float32"), t.NDArray(shape=()), NO),
         (NDArray((), "float32", b""), t.NDArray(), FULL),
         # Images, as ArmarX and as OpenCV have them.
+        # Width and height in either order: ArmarX says width x height, numpy has height x width.
+        (array(640, 480, 3, 1, element="uint8"), image_rgb(640, 480), FULL),
+        (array(480, 640, 3, 1, element="uint8"), image_rgb(640, 480), FULL),
+        (array(480, 640, 3, element="16"), image_rgb(640, 480), FULL),
+        (array(3, 640, 480, 1, element="uint8"), image_rgb(640, 480), NO),
+        (array(480, 480, 3, 1, element="uint8"), image_rgb(640, 480), NO),
+        (array(480, 640, 4, element="float32"), image_depth(640, 480), FULL),
+        (array(480, 640, 1, 4, element="float32"), image_depth(640, 480), FULL),
+        (array(640, 640, 4, element="float32"), image_depth(640, 480), NO),
+        (array(480, 640, 4, element="float32"), t.NDArray(shape=(640, 480)), NO),
         (array(640, 480, 3, 1, element="uint8"), IMAGE, FULL),
         (array(480, 640, 3, element="16"), IMAGE, FULL),
         (array(480, 640, 3, 1, element="16"), IMAGE, FULL),

@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from armem_bridge.long_term import Consolidation, LongTermMemory, arrival_of
 from armem_bridge.long_term.catalogue import Catalogue
+from armem_bridge.long_term.contents import entities, memory_names
 from armem_bridge.long_term.mapping import below
-from armem_bridge.memory_id import MemoryID
+from armem_bridge.long_term.source import LongTermSource
+from armem_bridge.memory_id import Level, MemoryID
+from armem_bridge.moments import to_datetime
 from armem_bridge.working import Snapshot
 from elm.app import Memory
 from elm.cues.algebra import Cue
+from elm.event import Event
+from elm.interval import Interval
 from elm.storage.memory import MemoryStore
 from elm.store import ByFeature, Group, Grouping
 from tests.armem.long_term.memories import QUICK, behind
@@ -75,6 +80,21 @@ def test_what_is_written_during_a_look_is_not_lost() -> None:
     keep(memory, snapshot(1))
     catalogue = Catalogue(memory)
     assert sorted(catalogue.entities()) == [CUP, MUG]
+
+
+def test_what_events_of_others_say_of_ids_is_no_name() -> None:
+    memory = Memory(MemoryStore())
+    memory.add_type("Note")
+    said: list[str | int] = ["%zz", "Object/Instance", "", 7, "a/b/c/d/e"]
+    for number, text in enumerate(said):
+        named: list[tuple[str, str | int]] = [("armem.id", text), ("armem.memory", ""), ("armem.core_segment", "")]
+        memory.commit(Event(type="Note", interval=Interval.at(to_datetime(number)), features=named))
+    keep(memory, snapshot(10))
+
+    assert Catalogue(memory).entities() == [CUP]
+    assert memory_names(memory) == ["Object"]
+    assert LongTermSource(memory).names(CUP.cut(Level.MEMORY)) == ["Instance"]
+    assert list(entities(memory, MemoryID())) == [CUP]
 
 
 def test_names_in_every_store(store_factory: StoreFactory) -> None:

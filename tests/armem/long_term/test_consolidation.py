@@ -11,7 +11,7 @@ import pytest
 from armem_bridge.aron import type_objects as t
 from armem_bridge.long_term import Consolidation, LongTermMemory, When
 from armem_bridge.long_term.refusals import ArchiveClosed, BacklogFull, InvalidArchive, NotConsolidated
-from armem_bridge.long_term.source import LongTermSource
+from armem_bridge.long_term.source import LAST, LongTermSource
 from armem_bridge.long_term.writing import SetAside
 from armem_bridge.memory_id import MemoryID
 from armem_bridge.moments import GREATEST
@@ -25,7 +25,7 @@ from elm.geometry import Region
 from tests.armem.long_term.memories import QUICK, FailingStore, behind, in_process
 from tests.armem.long_term.test_source import HeldStore
 from tests.armem.working.oracle import about_the_cup
-from tests.armem.working.scenes import CUP, MEMORY, commit, moments, snapshot, update
+from tests.armem.working.scenes import CUP, MEMORY, commit, moments, object_memory, snapshot, update
 from tests.conftest import StoreFactory
 
 MUG = CUP.with_entity("mug")
@@ -79,9 +79,11 @@ def test_durable_commits_are_kept_whole_or_refused() -> None:
     store = FailingStore()
     memory = Memory(store)
     with behind(LongTermMemory(memory, DURABLE)) as server:
-        result = server.commit(Commit(updates=[update(10), update(GREATEST)]))
+        store.poison = {"mug": InvalidValue("never")}
+        result = server.commit(Commit(updates=[update(10), update(10, entity=MUG)]))
         assert not any(each.success for each in result.results)
-        assert "is beyond the year 9999" in result.errors[0]
+        assert "InvalidValue: never" in result.errors[0]
+        store.poison = {}
         store.errors = [DatabaseUnreachable("the plug was pulled")] * 1000
         result = server.commit(Commit(updates=[update(10)]))
         assert "could not be made durable within 0.1 s: the plug was pulled" in result.errors[0]
@@ -114,6 +116,7 @@ def test_the_database_may_be_away_for_a_while(caplog: pytest.LogCaptureFixture) 
     assert kept(archive.memory) == [10, 20]
     status = archive.status()
     assert (status["failures"], status["failing_seconds"], status["set_aside"]) == (3, 0.0, 0)
+    assert status["without_region"] == status["consolidated"] == 2
     assert status["last_error"] == "DatabaseUnreachable: no route"
     said = [each.getMessage() for each in caplog.records]
     assert said == [
@@ -172,16 +175,18 @@ def test_the_bytes_that_wait_are_bounded_and_a_single_commit_always_fits() -> No
 
 def test_what_elm_cannot_keep_is_set_aside_and_the_rest_is_kept(caplog: pytest.LogCaptureFixture) -> None:
     told: list[SetAside] = []
-    archive = LongTermMemory(in_process(), QUICK, on_set_aside=told.append)
+    store = FailingStore()
+    store.poison = {"mug": InvalidValue("never")}
+    archive = LongTermMemory(Memory(store), QUICK, on_set_aside=told.append)
     with behind(archive) as server:
-        commit(server, update(10), update(GREATEST), update(20))
+        commit(server, update(10), update(15, entity=MUG), update(20))
         assert archive.flush(timeout=30)
-        assert server.get(CUP.with_timestamp(GREATEST)) is not None
+        assert server.get(MUG.with_timestamp(15)) is not None
     assert kept(archive.memory) == [10, 20]
     (aside,) = archive.set_aside
     assert told == [aside]
-    assert aside.snapshot.id == CUP.with_timestamp(GREATEST)
-    assert "is beyond the year 9999" in aside.reason
+    assert aside.snapshot.id == MUG.with_timestamp(15)
+    assert aside.reason == "InvalidValue: never"
     status = archive.status()
     assert status["set_aside"] == 1
     assert status["last_set_aside"] == [str(aside)]
@@ -205,10 +210,67 @@ def test_what_is_told_of_snapshots_set_aside_may_fail() -> None:
     def tell(_: object) -> None:
         raise ValueError("not now")
 
-    archive = LongTermMemory(in_process(), QUICK, on_set_aside=tell)
+    store = FailingStore()
+    store.poison = {"mug": InvalidValue("never")}
+    archive = LongTermMemory(Memory(store), QUICK, on_set_aside=tell)
     with behind(archive) as server:
-        commit(server, update(GREATEST), update(10))
+        commit(server, update(5, entity=MUG), update(10))
     assert kept(archive.memory) == [10]
+    assert archive.status()["set_aside"] == 1
+
+
+@pytest.mark.parametrize("settings", [QUICK, DURABLE, EVICTED])
+def test_times_that_elm_does_not_have_are_refused_by_themselves(settings: Consolidation) -> None:
+    archive = LongTermMemory(in_process(), settings)
+    with behind(archive) as server:
+        result = server.commit(Commit(updates=[update(GREATEST), update(-1), update(LAST), update(LAST + 1)]))
+        assert [each.success for each in result.results] == [False, False, True, False]
+        assert "beyond the year 9999" in result.errors[0]
+        assert "no valid referenced time" in result.errors[1]
+        assert moments(server.query(about_the_cup(AllSnapshots()))) == [LAST]
+    assert archive.set_aside == ()
+
+
+def test_what_is_acknowledged_while_long_term_memory_closes_is_kept() -> None:
+    class Closing:
+        """Where the robot was, asked of somebody who closes everything on the way."""
+
+        def region(self, moment: int) -> Region | None:
+            return None
+
+        def note(self, snapshots: object) -> None:
+            archive.close()
+
+    archive = LongTermMemory(in_process(), QUICK, location=Closing())
+    server = object_memory(archive=archive)
+    result = server.commit(Commit(updates=[update(10)]))
+    assert not result.success
+    assert "ArchiveClosed: long-term memory was closed meanwhile" in result.errors[0]
+    assert server.status().snapshots == archive.memory.recall().count() == 0
+    server.close()
+
+
+def test_commits_that_go_on_when_the_server_closes_are_kept() -> None:
+    store = HeldStore()
+    archive = LongTermMemory(Memory(store), Consolidation(backlog=1, wait=30.0, patience=0.0))
+    server = object_memory(archive=archive)
+    commit(server, update(10))
+    results: list[CommitResult] = []
+    # The backlog is full, so this one waits for room, and closing waits for it.
+    committing = Thread(target=lambda: results.append(server.commit(Commit(updates=[update(20)]))))
+    committing.start()
+    closing = Thread(target=server.close)
+    while not server._door._inside:
+        time.sleep(0.001)
+    closing.start()
+    closing.join(timeout=0.1)
+    assert closing.is_alive()
+    store.go.set()
+    closing.join(timeout=30)
+    committing.join(timeout=30)
+    archive.close()
+    assert [each.success for each in results] == [True]
+    assert kept(archive.memory) == [10, 20]
 
 
 def test_a_snapshot_that_is_there_with_another_type_is_the_same() -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import closing
-
 import numpy as np
 import pytest
 from shapely.geometry import Polygon
@@ -88,15 +86,28 @@ def test_wrong_settings_are_refused() -> None:
 def test_snapshots_have_the_region_of_the_robot() -> None:
     known = places(max_age=10)
     memory = in_process()
-    server = MemoryServer("RobotState", [CoreSegmentDefinition(name="Localization")])
-    with server, closing(known.follow(server)) as following:
+    archive = LongTermMemory(memory, Consolidation(patience=0.01), location=known)
+    server = MemoryServer("RobotState", [CoreSegmentDefinition(name="Localization")], archive=archive)
+    with behind(archive) as objects, server:
         pose = posed(95, 1000, 0, entity=STATE, key="global_pose")
         assert server.commit(Commit(updates=[pose])).success
-        assert following.flush(timeout=10)
-    with behind(LongTermMemory(memory, Consolidation(patience=0.01), location=known)) as objects:
         commit(objects, update(100), update(200))
 
-    assert [event.region for event in memory.recall()] == [Region.around(1, 0, 0.3), None]
+    region = Region.around(1, 0, 0.3)
+    assert [event.region for event in memory.recall()] == [region, region, None]
+
+
+def test_no_pose_is_missed_where_working_memory_keeps_none_for_long() -> None:
+    """Not even the poses of commits that come faster than anybody could ask for them again."""
+    known = places(max_age=0)
+    archive = LongTermMemory(in_process(), Consolidation(patience=0.01), location=known)
+    limits = {STATE: 1}
+    core = CoreSegmentDefinition(name="Localization")
+    with archive, MemoryServer("RobotState", [core], archive=archive, limits=limits) as server:
+        for moment in range(200):
+            server.commit(Commit(updates=[posed(moment, moment, 0, entity=STATE, key="global_pose")]))
+        assert server.status().snapshots == 1
+    assert [known.region(moment) for moment in range(200)] == [Region.around(n / 1000, 0, 0.3) for n in range(200)]
 
 
 def test_durable_commits_do_not_wait_for_the_robot() -> None:

@@ -104,6 +104,7 @@ POSITION = t.Object(name="Position", members={"value": t.Int(), "frame": t.Strin
         ({"referenced": 2**63}, "no valid referenced time"),
         ({"referenced": 1.5}, "no valid referenced time"),
         ({"sent": None}, "sent time"),
+        ({"sent": 2**63}, "sent time .* of 64 bits"),
         ({"confidence": math.nan}, "confidence"),
         ({"confidence": "sure"}, "confidence"),
         ({"confidence": True}, "confidence"),
