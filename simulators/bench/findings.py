@@ -55,12 +55,13 @@ class Report:
         file.write_text(json.dumps(self.as_json(run), indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
 
     def show(self, title: str, console: Console) -> None:
-        """Print the tables, the goals last."""
+        """Print the tables, the goals last where there are some."""
         goals = table_of("figure", "value", "goal", "")
         for goal in self.goals:
             goals.add_row(goal.name, f"{goal.value:.2f}", goal.bound, "met" if goal.met else "[bold red]missed[/]")
         # Not as the tables' own titles, which are broken to their widths.
-        for heading, table in {**self.tables, title: goals}.items():
+        shown = {**self.tables, title: goals} if self.goals else self.tables
+        for heading, table in shown.items():
             console.print(f"\n[bold]{heading}[/]")
             console.print(table)
 

@@ -16,6 +16,8 @@ from simulators.bench.machine import circumstances, load_average
 from simulators.bench.scratch import database
 
 SEED = 1
+INTERRUPTED = 130
+"""The exit code of what was stopped by Ctrl-C, as shells have it."""
 
 
 def options(command: str, description: str) -> ArgumentParser:
@@ -29,7 +31,7 @@ def options(command: str, description: str) -> ArgumentParser:
 
 
 def run(command: str, given: Namespace, measure: Callable[[str, Namespace], Report]) -> int:
-    """Measure, print, write; an error of elm is one line on stderr and exit code 1."""
+    """Measure, print, write; an error of elm is one line on stderr and exit code 1, Ctrl-C one line and 130."""
     # Fixed width where nobody watches: a log must not cut the figures off.
     console = Console(highlight=False, width=None if sys.stdout.isatty() else 140)
     try:
@@ -40,6 +42,9 @@ def run(command: str, given: Namespace, measure: Callable[[str, Namespace], Repo
     except ElmError as error:
         print(f"simulators {command}: {error}", file=sys.stderr)
         return 1
+    except KeyboardInterrupt:
+        print(f"simulators {command}: stopped before the end; scratch memories are dropped", file=sys.stderr)
+        return INTERRUPTED
     about |= {
         "measurement": command,
         "options": {name: str(value) for name, value in vars(given).items() if name not in ("json", "dsn")},

@@ -6,6 +6,7 @@ import importlib.util
 import json
 import math
 import os
+from argparse import Namespace
 from collections.abc import Iterator
 from itertools import islice, pairwise
 from pathlib import Path
@@ -20,7 +21,8 @@ from elm import cues
 from elm.errors import StoreFailure
 from elm.interval import Interval
 from simulators.__main__ import main
-from simulators.bench.findings import Goal
+from simulators.bench.findings import Goal, Report
+from simulators.bench.measurement import options, run
 from simulators.bench.scratch import bare_schema, connect, scratch_memory, with_setting
 from simulators.bench.timing import in_milliseconds, in_turn, mean_ratio, median_ratio
 from simulators.bench.twins import Twins
@@ -195,6 +197,17 @@ def test_a_database_that_cannot_be_measured_is_one_line_on_stderr(
     assert said.err.startswith("simulators insert: ")
     assert reason in said.err
     assert said.out == ""
+
+
+def test_a_measurement_that_is_stopped_says_so_in_one_line(dsn: str, capsys: pytest.CaptureFixture[str]) -> None:
+    def stopped(_: str, __: Namespace) -> Report:
+        raise KeyboardInterrupt
+
+    given = options("insert", "").parse_args(["--dsn", dsn, "--quick"])
+    assert run("insert", given, stopped) == 130
+    assert capsys.readouterr().err.splitlines() == [
+        "simulators insert: stopped before the end; scratch memories are dropped"
+    ]
 
 
 # Fairness
