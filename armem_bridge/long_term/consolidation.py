@@ -114,7 +114,7 @@ class LongTermMemory:
         self._check_open()
         beyond = {index: _BEYOND for index, snapshot in enumerate(snapshots) if snapshot.referenced > LAST}
         if beyond:
-            raise NotKept(beyond)
+            raise NotKept.because(beyond)
         if self._poses is not None:
             # Before anything is consolidated that came after them, also where working memory keeps none for long.
             self._poses.note(snapshots)

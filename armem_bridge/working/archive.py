@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Protocol
+from types import MappingProxyType
+from typing import Protocol, Self
 
 import msgspec
 
@@ -23,12 +24,15 @@ class Evicted(msgspec.Struct, frozen=True, kw_only=True):
 class NotKept(ArmemError, ValueError):
     """An archive can never keep some of the snapshots it was given. Correct those, and give it the others again."""
 
-    def __init__(self, refused: Mapping[int, str]) -> None:
-        if not refused:
-            raise ValueError("an archive that keeps everything has nothing to refuse")
-        super().__init__("; ".join(sorted(set(refused.values()))))
-        self.refused = dict(refused)
-        """The reasons, by the positions in what it was given; of all that nothing was taken."""
+    refused: Mapping[int, str] = MappingProxyType({})
+    """The reasons, by the positions in what it was given; of all that nothing was taken."""
+
+    @classmethod
+    def because(cls, refused: Mapping[int, str]) -> Self:
+        """What is not kept and why, by the positions of one snapshot at least."""
+        error = cls("; ".join(sorted(set(refused.values()))))
+        error.refused = MappingProxyType(dict(refused))
+        return error
 
 
 class Archive(Protocol):

@@ -178,7 +178,7 @@ def test_a_killed_server_comes_back_with_all_that_was_committed(cluster: Cluster
     ask(cluster, "CREATE TABLE committed AS SELECT 7 AS answer")
     with contextlib.closing(psycopg.connect(cluster.dsn())) as busy:
         # A backend in the middle of its work outlives its server, and the data are in use until it ends.
-        busy.pgconn.send_query(b"SELECT count(*) FROM generate_series(1, 4000) a, generate_series(1, 4000) b")
+        busy.pgconn.send_query(b"SELECT count(*) FROM generate_series(1, 10000) a, generate_series(1, 4000) b")
         killed = kill_server(cluster)
         cluster.up()
     assert "is still in use" in cluster.status().log_file.read_text()
