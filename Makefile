@@ -11,6 +11,7 @@ setup:  ## .venv with the development tools, PostgreSQL with PostGIS from the sy
 
 demo: setup  ## fill a memory with half an hour of a real robot's life and ask it questions; then ArmarX's memory
 	@mkdir -p out
+	@for memory in mower kitchen; do .venv/bin/elm migrate --memory $$memory >/dev/null; done
 	@.venv/bin/elm demo --picture out/plaza.png
 	@.venv/bin/elm armem demo
 

@@ -98,7 +98,9 @@ def _translate(error: psycopg.Error, memory: str) -> ElmError:
                 f"on its tables and on its sequences)"
             )
         case psycopg.errors.UndefinedTable() | psycopg.errors.InvalidSchemaName():
-            return MemoryMissing(f"memory {memory!r} is missing or incomplete: {said}. Run `elm migrate`")
+            return MemoryMissing(
+                f"memory {memory!r} is missing or incomplete: {said}. Run `elm migrate --memory {memory}`"
+            )
         case psycopg.errors.DiskFull() | psycopg.errors.OutOfMemory() | psycopg.errors.ProgramLimitExceeded():
             return DatabaseUnfit(f"the database server is out of room for this: {said}")
         case psycopg.errors.ReadOnlySqlTransaction():

@@ -46,7 +46,9 @@ def require(connection: Connection, memory: str) -> None:
     """Refuse to work with a memory that is missing, or whose schema is not the one this elm knows."""
     revision = revision_of(connection, memory)
     if revision is None:
-        raise MemoryMissing(f"there is no memory {memory!r} yet: the first write creates it, or `elm migrate` does")
+        raise MemoryMissing(
+            f"there is no memory {memory!r} yet: the first write creates it, or `elm migrate --memory {memory}` does"
+        )
     check_revision(revision, memory)
 
 
@@ -56,7 +58,8 @@ def check_revision(revision: str, memory: str) -> None:
         return
     if revision in older_revisions():
         raise SchemaMismatch(
-            f"memory {memory!r} has the older schema {revision} (this elm has {REVISION}): run `elm migrate`"
+            f"memory {memory!r} has the older schema {revision} (this elm has {REVISION}): "
+            f"run `elm migrate --memory {memory}`"
         )
     raise SchemaMismatch(f"memory {memory!r} has the newer schema {revision} (this elm has {REVISION}): upgrade elm")
 

@@ -348,7 +348,9 @@ def test_memory_of_an_older_elm(
 ) -> None:
     event = begin(stores(MEMORY), "Thing")
     later = later_elm("SELECT 1")
-    refused = f"memory {MEMORY!r} has the older schema {REVISION} (this elm has 9000): run `elm migrate`"
+    refused = (
+        f"memory {MEMORY!r} has the older schema {REVISION} (this elm has 9000): run `elm migrate --memory {MEMORY}`"
+    )
     assert _said(_COUNT, dsn, MEMORY, sources=later).endswith(f"SchemaMismatch: {refused}")
     done = _said(_MIGRATE, dsn, MEMORY, sources=later)
     assert done == f"migrated memory {MEMORY!r} from schema {REVISION} to 9000\n"
