@@ -235,7 +235,8 @@ class LongTermMemory:
         while not self._stopped:
             batch = self._backlog.take(self.settings.batch, self._is_ready, timeout=1.0)
             if not batch:
-                time.sleep(GLANCE if len(self._backlog) else 0.0)
+                if len(self._backlog):
+                    time.sleep(GLANCE)
                 continue
             try:
                 self._consolidate(batch)

@@ -11,7 +11,7 @@ from armem_bridge.long_term.catalogue import Catalogue, names_below
 from armem_bridge.long_term.mapping import CORE_SEGMENT, ENTITY, PROVIDER_SEGMENT, below, is_snapshot, snapshot_of
 from armem_bridge.memory_id import Level, MemoryID
 from armem_bridge.moments import to_datetime
-from armem_bridge.working.history import History, index_slice
+from armem_bridge.working.history import History, read_index_range
 from armem_bridge.working.snapshot import Snapshot, supersedes
 from elm.app import Memory
 from elm.cues import time
@@ -101,13 +101,7 @@ class LongTermHistory:
         return next(iter(self.between(moment, moment)), None)
 
     def index_range(self, first: int, last: int) -> Sequence[Snapshot]:
-        if first < 0 and last < 0:
-            candidates = self.latest(-first)
-        elif first >= 0 and last >= 0:
-            candidates = self.after(-1, last + 1)
-        else:
-            candidates = self.all()
-        return candidates[index_slice(first, last, len(candidates))]
+        return read_index_range(self, first, last)
 
     def _first(self, count: int, begin: int | None, end: int | None) -> Sequence[Snapshot]:
         """The `count` first ones from `begin` to `end`."""

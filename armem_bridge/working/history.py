@@ -67,3 +67,14 @@ def index_slice(first: int, last: int, count: int) -> slice:
     begin = first if first >= 0 else max(count + first, 0)
     end = last if last >= 0 else count + last
     return slice(begin, max(end + 1, 0))
+
+
+def read_index_range(history: History, first: int, last: int) -> Sequence[Snapshot]:
+    """An index range of a history that can be read from both ends: what one end tells is not read from the other."""
+    if first < 0 and last < 0:
+        candidates = history.latest(-first)
+    elif first >= 0 and last >= 0:
+        candidates = history.after(-1, last + 1)
+    else:
+        candidates = history.all()
+    return candidates[index_slice(first, last, len(candidates))]

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 
 from armem_bridge.aron.type_objects import TypeObject
 from armem_bridge.memory_id import MemoryID
-from armem_bridge.working.history import History, Source, index_slice
+from armem_bridge.working.history import History, Source, read_index_range
 from armem_bridge.working.snapshot import Snapshot, supersedes
 
 
@@ -66,13 +66,7 @@ class _UnionHistory:
         return next(iter(_merge([[each] for each in found if each is not None])), None)
 
     def index_range(self, first: int, last: int) -> Sequence[Snapshot]:
-        if first < 0 and last < 0:
-            candidates = self.latest(-first)
-        elif first >= 0 and last >= 0:
-            candidates = self.after(-1, last + 1)
-        else:
-            candidates = self.all()
-        return candidates[index_slice(first, last, len(candidates))]
+        return read_index_range(self, first, last)
 
     def _merged(self, ask: Callable[[History], Sequence[Snapshot]]) -> list[Snapshot]:
         return _merge(ask(history) for history in self._histories)

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
 import sys
+from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, Self
@@ -18,8 +17,7 @@ from armem_bridge.moments import NOT_SET
 from armem_bridge.working import Commit, EntityUpdate, Instance, Memory, Metadata, Snapshot
 from armem_bridge.working.commit import UpdateResult
 from armem_bridge.working.tree import CoreSegment, Entity, ProviderSegment
-
-ROOT: Final = Path(__file__).resolve().parents[2]
+from simulators.armem.processes import ROOT, Process
 
 SLICES: Final = ROOT / "tests" / "armem" / "ice" / "slices"
 """The stand-ins for ArmarX's slice files, which measurements on one machine do as well with."""
@@ -48,25 +46,12 @@ class Echo:
 
     def __init__(self, communicator: Any, slices: Path = FOURTH) -> None:
         words, echo = load_echo(slices)
-        self._process = subprocess.Popen(  # noqa: S603 - our own program
-            [sys.executable, "-m", "simulators.armem.echo", str(slices)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-            cwd=ROOT,
-            env={**os.environ, "PYTHONPATH": str(ROOT)},
-        )
-        try:
-            assert self._process.stdout is not None  # noqa: S101 - a pipe
-            where = self._process.stdout.readline().split("\t")
-            if len(where) != 2:
-                raise ConnectionError("the echo server did not start: see what it wrote to stderr")
-            data, memory = (communicator.stringToProxy(each.strip()) for each in where)
+        with ExitStack() as starting:
+            process = starting.enter_context(Process("simulators.armem.echo", str(slices)))
+            data, memory = map(communicator.stringToProxy, process.line().split("\t"))
             self.data = echo.EchoServerPrx.uncheckedCast(data)
             self.memory = words.server.MemoryInterfacePrx.uncheckedCast(memory)
-        except BaseException:
-            self.close()
-            raise
+            self._running = starting.pop_all()
 
     def forget(self) -> None:
         """Have the next commit be the first one."""
@@ -74,14 +59,7 @@ class Echo:
 
     def close(self) -> None:
         """End the process."""
-        for pipe in (self._process.stdin, self._process.stdout):
-            if pipe is not None:
-                pipe.close()
-        try:
-            self._process.wait(20)
-        finally:
-            self._process.kill()
-            self._process.wait()
+        self._running.close()
 
     def __enter__(self) -> Self:
         return self

@@ -1,20 +1,17 @@
-"""`elm armem`: the page's examples, what ends how, and memories that are served to other processes through Ice."""
+"""`elm armem`: what its commands print, what ends how, and memories that are served to other processes through Ice."""
 
 from __future__ import annotations
 
 import json
 import os
 import pty
-import re
 import select
 import signal
 import socket
 import subprocess
 import sys
-import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
-from doctest import ELLIPSIS, OutputChecker
 from pathlib import Path
 from typing import Any
 
@@ -23,34 +20,17 @@ import typer
 from typer.testing import CliRunner
 
 from armem_bridge.cli import app
-from armem_bridge.config import Mode, read_config, tables
+from armem_bridge.config import read_config
 from armem_bridge.ice.installation import load_ice, slice_directory
 from armem_bridge.ice.refusals import IceMissing
 from tests.cli.conftest import SOURCES, Program
-from tests.cli.test_documentation import _examples, _options, _run
 from tests.servers import Server
 
-ENTRY_POINT = "armem_bridge.cli:app"
-SECTION = "Running a server"
-PAGE = SOURCES / "docs" / "armem.md"
 SLICES = SOURCES / "tests" / "armem" / "ice" / "slices" / "gen4"
 COMMANDS = typer.main.get_command(app).commands  # type: ignore[attr-defined]
 MUG = "Object/Instance/ObjectLocalizer/mug"
 CUP = "Object/Instance/ObjectLocalizer/blue-cup"
 END = 1_767_261_659_000_000
-
-
-@pytest.fixture(autouse=True)
-def site(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Where a package is installed that adds the command, as elm's own does."""
-    directory = tmp_path_factory.mktemp("site")
-    information = directory / "armem_of_a_test-1.0.dist-info"
-    information.mkdir()
-    (information / "METADATA").write_text("Metadata-Version: 2.1\nName: armem-of-a-test\nVersion: 1.0\n")
-    (information / "entry_points.txt").write_text(f"[elm.cli]\narmem = {ENTRY_POINT}\n")
-    monkeypatch.syspath_prepend(directory)
-    monkeypatch.setenv("PYTHONPATH", str(directory))
-    return directory
 
 
 @pytest.fixture(scope="module")
@@ -79,116 +59,12 @@ def ice() -> None:
         pytest.skip(str(error))
 
 
-# The page
-
-
-on_the_page = pytest.mark.skipif(not PAGE.exists(), reason="the documents are not beside the installed package")
-
-
-def section() -> str:
-    if not PAGE.exists():
-        return ""
-    text = PAGE.read_text(encoding="utf-8")
-    pieces = re.split(r"^## (.*)$", text, flags=re.MULTILINE)
-    return dict(zip(pieces[1::2], pieces[2::2], strict=True))[SECTION]
-
-
-def blocks() -> list[tuple[str, str, str]]:
-    return re.findall(r"^```(\w+)(?: (\S+))?\n(.*?)^```$", section(), flags=re.MULTILINE | re.DOTALL)
-
-
-@on_the_page
-def test_the_examples_print_what_the_page_says(postgres_server: Server, tmp_path: Path) -> None:
-    with postgres_server.database() as dsn:
-        elm = Program(directory=tmp_path, settings={"ELM_DSN": dsn, "ELM_HOME": str(tmp_path / "no-home")})
-        commands = 0
-        for kind, name, text in blocks():
-            if name:
-                (tmp_path / name).write_text(text, encoding="utf-8")
-            for command, expected, code in _examples(text) if kind == "console" else ():
-                printed, ended = _run(elm, command)
-                assert OutputChecker().check_output(expected, printed, ELLIPSIS), f"$ {command}\n{printed}"
-                assert ended == code, f"$ {command}\n{printed}"
-                commands += 1
-        assert commands >= 11
-
-
-@on_the_page
-def test_the_python_of_the_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    for kind, name, text in blocks():
-        if name:
-            # Here the memories are for this program alone, and so is what they are consolidated into.
-            alone = text.partition("[ice]")[0].replace('memory = "kitchen"', 'memory = "kitchen"\ndsn = "memory://"')
-            Path(name).write_text(alone if kind == "toml" else text, encoding="utf-8")
-        elif kind == "python":
-            exec(compile(text, PAGE.name, "exec"), {})  # noqa: S102 - the page is ours
-
-
-@on_the_page
-@pytest.mark.parametrize("name", COMMANDS)
-def test_the_page_shows_each_command_with_its_options(name: str) -> None:
-    text = section()
-    assert f"$ elm armem {name}" in text
-    shared = {"--output", "--memory", "--dsn"}
-    assert {option for option in _options(COMMANDS[name]) - shared if option not in text} == set()
-
-
-@on_the_page
-def test_the_page_names_every_key_of_the_file_and_no_others() -> None:
-    every = {
-        key: kind
-        for kind in vars(tables).values()
-        if isinstance(kind, type) and issubclass(kind, tables.Table)
-        for key in kind.__struct_fields__
-    }
-    listed = "".join(line for line in section().splitlines() if line.startswith("| "))
-    named = set(re.findall(r"`(\w+)`|(?<=[`{ ,])(\w+) = ", listed))
-    shown = {word for pair in named for word in pair if word}
-    holding = {"memories", "core_segments", "long_term", "forgetting", "online", "offline", "ice"}
-    assert every.keys() - holding - shown == set()
-    assert shown - every.keys() == {
-        "Object",
-        "ObjectMemory",
-        "mse",
-        "mae",
-        "cosine",
-        "map",
-        "elm",
-        "tcp",
-        "false",
-        "true",
-    }
-
-
-@pytest.mark.parametrize("row", re.findall(r"`(\{[a-z_]+ = [^`]*\})`", section()))
-def test_the_tables_of_the_page_are_toml(row: str) -> None:
-    assert tomllib.loads(f"x = {row}")["x"]
-
-
-@on_the_page
-def test_defaults_of_the_page_are_those_of_the_tables() -> None:
-    text = section()
-    memory, ice = tables.MemoryTable(), tables.IceTable(mode=Mode.JOIN)
-    assert (memory.delay_warning, memory.update_bytes) == (1.0, 256 * 1024**2)
-    assert f"default `{ice.host}` and {ice.port}" in text
-    assert f"default `{ice.endpoint}`" in text
-    assert f"default `{tables.LongTermTable().memory}`" in text
-    assert f"default `{tables.LongTermTable().frame}`" in text
-
-
 # Commands on long-term memory
 
 
 def lines(done: subprocess.CompletedProcess[str]) -> list[dict[str, Any]]:
     assert done.returncode == 0, done.stderr
     return [json.loads(line) for line in done.stdout.splitlines()]
-
-
-@on_the_page
-def test_the_package_names_the_command() -> None:
-    settings = tomllib.loads((SOURCES / "pyproject.toml").read_text(encoding="utf-8"))
-    assert settings["project"]["entry-points"]["elm.cli"] == {"armem": ENTRY_POINT}
 
 
 def test_elm_takes_the_command_in(kitchen: Program) -> None:

@@ -8,41 +8,31 @@ from pathlib import Path
 from armem_bridge.memory_id import MemoryID
 from armem_bridge.working import CoreSegmentDefinition, MemoryServer
 from armem_bridge.working.builder import SnapshotsSelector
+from tests.pages import Page
 
-PAGE = (Path(__file__).resolve().parents[2] / "docs" / "armem.md").read_text(encoding="utf-8")
-SECTIONS = {part.partition("\n")[0]: part for part in re.split(r"^## ", PAGE, flags=re.MULTILINE)[1:]}
+PAGE = Page("docs/armem.md")
 
 WORKING_MEMORY = ("Memory servers", "IDs", "Commits", "Queries", "Listening", "Prior knowledge", "Names")
 """The sections whose blocks run one after the other, with nothing but working memory."""
-
 
 LONG_TERM_MEMORY = ("Long-term memory",)
 """The sections whose blocks run after those, with an elm memory in the process."""
 
 
-def blocks(sections: tuple[str, ...], language: str) -> list[str]:
-    text = "".join(SECTIONS[name] for name in sections)
-    return re.findall(rf"^```{language}\n(.*?)^```$", text, flags=re.MULTILINE | re.DOTALL)
-
-
 def test_the_python_about_working_memory_runs() -> None:
-    scope: dict[str, object] = {}
-    found = blocks(WORKING_MEMORY, "python")
+    found = PAGE.blocks("python", *WORKING_MEMORY)
     assert len(found) == 7
-    for block in found:
-        exec(compile(block, "docs/armem.md", "exec"), scope)  # noqa: S102 - the page is ours
+    PAGE.run(found)
 
 
 def test_the_python_about_long_term_memory_runs() -> None:
-    scope: dict[str, object] = {}
-    found = [*blocks(WORKING_MEMORY, "python"), *blocks(LONG_TERM_MEMORY, "python")]
+    found = PAGE.blocks("python", *WORKING_MEMORY, *LONG_TERM_MEMORY)
     assert len(found) == 7 + 4
-    for block in found:
-        exec(compile(block, "docs/armem.md", "exec"), scope)  # noqa: S102 - the page is ours
+    PAGE.run(found)
 
 
 def test_the_file_of_prior_knowledge_is_one(tmp_path: Path) -> None:
-    (shown,) = blocks(("Prior knowledge",), "json")
+    (shown,) = PAGE.blocks("json", "Prior knowledge")
     file = tmp_path / "classes.json"
     file.write_text(shown, encoding="utf-8")
     server = MemoryServer("Object", [CoreSegmentDefinition(name="Class")], prior_knowledge=[file])
@@ -52,7 +42,7 @@ def test_the_file_of_prior_knowledge_is_one(tmp_path: Path) -> None:
 
 
 def test_the_table_lists_every_selection_of_snapshots() -> None:
-    rows = [line.split("|")[1] for line in SECTIONS["Queries"].splitlines() if line.startswith("| `")]
+    rows = [line.split("|")[1] for line in PAGE.sections["Queries"].splitlines() if line.startswith("| `")]
     listed = {name for row in rows for name in re.findall(r"`(\w+)\(", row)}
 
     assert listed == {name for name in vars(SnapshotsSelector) if not name.startswith("_")}

@@ -4,29 +4,20 @@ from __future__ import annotations
 
 import json
 import re
-from pathlib import Path
 
 import pytest
 
 from armem_bridge.aron import data, textual, type_objects
+from tests.pages import Page
 
-PAGE = (Path(__file__).resolve().parents[2] / "docs" / "aron.md").read_text(encoding="utf-8")
-SECTIONS = {part.partition("\n")[0]: part for part in re.split(r"^## ", PAGE, flags=re.MULTILINE)[1:]}
-
-
-def blocks(text: str, language: str) -> list[str]:
-    return re.findall(rf"^```{language}\n(.*?)^```$", text, flags=re.MULTILINE | re.DOTALL)
-
-
-DOCUMENTS = [line for block in blocks(PAGE, "json") for line in block.splitlines()]
+PAGE = Page("docs/aron.md")
+DOCUMENTS = [line for block in PAGE.blocks("json") for line in block.splitlines()]
 
 
 def test_the_python_of_the_page_runs() -> None:
-    scope: dict[str, object] = {}
-    found = blocks(PAGE, "python")
+    found = PAGE.blocks("python")
     assert len(found) >= 8
-    for block in found:
-        exec(compile(block, "docs/aron.md", "exec"), scope)  # noqa: S102 - the page is ours
+    PAGE.run(found)
 
 
 @pytest.mark.parametrize("line", DOCUMENTS)
@@ -47,13 +38,13 @@ def test_every_kind_of_data_has_an_example() -> None:
 
 @pytest.mark.parametrize(("section", "module"), [("Data objects", data), ("Type objects", type_objects)])
 def test_the_tables_list_every_kind(section: str, module: object) -> None:
-    rows = "".join(line for line in SECTIONS[section].splitlines() if line.startswith("|"))
+    rows = "".join(line for line in PAGE.sections[section].splitlines() if line.startswith("|"))
     named = set(re.findall(r"`(\w+)(?:\([\w, ]*\))?`", rows))
     kinds = data.KINDS if module is data else type_objects.KINDS
     assert {kind.__name__ for kind in kinds} <= named
 
 
 def test_the_binary_form_has_every_kind() -> None:
-    rows = [line.split("|")[1] for line in SECTIONS["Binary form"].splitlines() if line.startswith("| ")]
+    rows = [line.split("|")[1] for line in PAGE.sections["Binary form"].splitlines() if line.startswith("| ")]
     named = {name.strip() for row in rows for name in row.split(",")}
     assert {kind.__name__ for kind in data.KINDS} <= named

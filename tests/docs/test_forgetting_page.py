@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import re
-from pathlib import Path
+from tests.pages import Page
 
-PAGE = (Path(__file__).parents[2] / "docs" / "forgetting.md").read_text(encoding="utf-8")
+PAGE = Page("docs/forgetting.md")
 
 
 def test_the_python_of_the_page_runs() -> None:
-    blocks = re.findall(r"^```python\n(.*?)^```", PAGE, flags=re.DOTALL | re.MULTILINE)
+    blocks = PAGE.blocks("python")
     assert len(blocks) == 4
-    scope: dict[str, object] = {}
-    for block in blocks:
-        exec(compile(block, "docs/forgetting.md", "exec"), scope)  # noqa: S102 - the page is ours
-    assert scope["report"] is not None
+    assert PAGE.run(blocks)["report"] is not None

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -23,20 +22,19 @@ from elm.exchange import (
 from elm.geometry import SpatialRelation
 from elm.interval import AllenRelation, parse_time
 from elm.store import Cursor
+from tests.pages import Page
 
-PAGE = (Path(__file__).resolve().parents[2] / "docs" / "formats.md").read_text(encoding="utf-8")
-SECTIONS = {part.partition("\n")[0]: part for part in re.split(r"^## ", PAGE, flags=re.MULTILINE)[1:]}
+PAGE = Page("docs/formats.md")
 
 
 def examples(section: str, language: str = "json") -> list[str]:
     """The lines of all code blocks of a section."""
-    blocks = re.findall(rf"^```{language}\n(.*?)^```$", SECTIONS[section], flags=re.MULTILINE | re.DOTALL)
-    return [line for block in blocks for line in block.splitlines()]
+    return [line for block in PAGE.blocks(language, section) for line in block.splitlines()]
 
 
 def rows(section: str) -> list[list[str]]:
     """The rows of a section's table, without its head."""
-    lines = [line for line in SECTIONS[section].splitlines() if line.startswith("|")][2:]
+    lines = [line for line in PAGE.sections[section].splitlines() if line.startswith("|")][2:]
     return [[cell.strip().strip("`") for cell in line.strip("|").split("|")] for line in lines]
 
 
@@ -50,9 +48,7 @@ TYPES, EVENTS, RESULTS, TOMBSTONES, CUES, SNAPSHOTS = map(examples, EXAMPLES)
 
 
 def test_no_example_is_passed_over() -> None:
-    assert len(re.findall(r"^```json$", PAGE, flags=re.MULTILINE)) == len(
-        re.findall(r"^```json$", "".join(SECTIONS[name] for name in EXAMPLES), re.MULTILINE)
-    )
+    assert PAGE.blocks("json") == PAGE.blocks("json", *EXAMPLES)
     assert all((TYPES, EVENTS, RESULTS, TOMBSTONES, CUES, SNAPSHOTS))
 
 

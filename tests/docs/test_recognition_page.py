@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import re
-from pathlib import Path
-
 from elm.cues.algebra import And, Cue, Not, Or, TypeCue, node
 from elm.recognition import RecognitionManager
 from elm.recognizers import Recognizer
 from elm.storage.memory import MemoryStore
 from elm.taxonomy import EventType
+from tests.pages import Page
 
-PAGE = (Path(__file__).parents[2] / "docs" / "recognition.md").read_text()
-BLOCKS = re.findall(r"^```python\n(.*?)^```", PAGE, flags=re.DOTALL | re.MULTILINE)
+PAGE = Page("docs/recognition.md")
 
 
 def _types(cue: Cue) -> set[str]:
@@ -30,10 +27,8 @@ def _types(cue: Cue) -> set[str]:
 
 def test_the_recognizers_of_the_page_work() -> None:
     found: dict[str, Recognizer] = {}
-    for block in BLOCKS:
-        scope: dict[str, object] = {}
-        exec(compile(block, "docs/recognition.md", "exec"), scope)  # noqa: S102 - the page is ours
-        values = [each for each in scope.values() if not isinstance(each, type)]
+    for block in PAGE.blocks("python"):
+        values = [each for each in PAGE.run([block]).values() if not isinstance(each, type)]
         shown = {each.name: each for each in values if isinstance(each, Recognizer)}
         assert shown, "a block of the page makes no recognizer"
         assert not shown.keys() & found.keys(), "two of the page's recognizers have one name"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import shlex
 from pathlib import Path
 
@@ -11,27 +10,22 @@ from typer.testing import CliRunner
 
 from elm.cli.program import app
 from simulators import __main__ as simulators
+from tests.pages import Page
 from tests.servers import Server
 
-PAGE = (Path(__file__).parents[2] / "docs" / "simulators.md").read_text(encoding="utf-8")
-
-
-def blocks(language: str) -> list[str]:
-    return re.findall(rf"^```{language}\n(.*?)^```", PAGE, flags=re.DOTALL | re.MULTILINE)
+PAGE = Page("docs/simulators.md")
 
 
 def test_the_python_of_the_page_runs() -> None:
-    found = blocks("python")
+    found = PAGE.blocks("python")
     assert len(found) >= 5
-    scope: dict[str, object] = {}
-    for block in found:
-        exec(compile(block, "docs/simulators.md", "exec"), scope)  # noqa: S102 - the page is ours
+    PAGE.run(found)
 
 
 def test_the_commands_of_the_page_run(
     postgres_server: Server, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (block,) = blocks("sh")
+    (block,) = PAGE.blocks("sh")
     simulate, *commands = map(shlex.split, block.splitlines())
     monkeypatch.chdir(tmp_path)
     assert simulate[:3] == ["python", "-m", "simulators"]

@@ -15,7 +15,7 @@ from armem_bridge.long_term import mapping
 from armem_bridge.long_term.payload import MEDIA_TYPE
 from elm.exchange import parse_json
 from elm.store import Arrival
-from tests.docs.test_formats import SECTIONS, SNAPSHOTS, examples, rows
+from tests.docs.test_formats import PAGE, SNAPSHOTS, rows
 
 SECTION = "ArmarX snapshots"
 (LINE,) = SNAPSHOTS
@@ -23,9 +23,7 @@ SECTION = "ArmarX snapshots"
 
 def made() -> dict[str, Any]:
     """What the Python on the page defines."""
-    scope: dict[str, Any] = {}
-    exec(compile("\n".join(examples(SECTION, "python")), "docs/formats.md", "exec"), scope)  # noqa: S102 - our page
-    return scope
+    return PAGE.run(PAGE.blocks("python", SECTION))
 
 
 def test_the_example_is_what_the_bridge_writes() -> None:
@@ -65,6 +63,6 @@ def test_the_payload_is_as_described() -> None:
     snapshot = made()["snapshot"]
 
     assert payload["media_type"] == MEDIA_TYPE
-    assert MEDIA_TYPE in SECTIONS[SECTION]
+    assert MEDIA_TYPE in PAGE.sections[SECTION]
     written = msgspec.msgpack.decode(base64.b64decode(payload["base64"]))
     assert written == ["armem", 1, [[0.9, 1767261600001500, None, encode(snapshot.instances[0].data)]]]

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from dataclasses import replace
 from datetime import timedelta
-from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -22,10 +20,10 @@ from elm.recognizers.measures import count
 from elm.recognizers.places import Standstill, Stay
 from elm.recognizers.together import CoOccurrence
 from elm.recognizers.windows import Windowed
+from tests.pages import Page
 from tests.recognition.ready_made import LATEST, Surroundings, fed, feed_all, in_order, moments_in
 
-PAGE = (Path(__file__).resolve().parents[2] / "docs" / "recognition.md").read_text(encoding="utf-8")
-EXAMPLES = re.findall(r"^```python\n(.*?)^```$", PAGE.partition("\n## Ready-made")[2], flags=re.MULTILINE | re.DOTALL)
+PAGE = Page("docs/recognition.md")
 
 A, B = cues.is_a("A"), cues.is_a("B")
 HERE = Region.box(0, 0, 2, 2)
@@ -183,10 +181,8 @@ def test_what_is_held_does_not_grow_with_what_was_fed(kind: type[Grouped], field
 
 def test_every_kind_has_an_example_that_runs() -> None:
     shown: list[Any] = []
-    for example in EXAMPLES:
-        names: dict[str, Any] = {}
-        exec(compile(example, "docs/recognition.md", "exec"), names)  # noqa: S102 - the page's own example
-        shown += [each for each in names.values() if isinstance(each, Grouped)]
+    for example in PAGE.blocks("python", "Ready-made recognizers"):
+        shown += [each for each in PAGE.run([example]).values() if isinstance(each, Grouped)]
 
     assert {type(each) for each in shown} == {kind for kind, _ in KINDS}
     assert all(fingerprint(is_recognizer(replace(each))) == fingerprint(each) for each in shown)

@@ -85,6 +85,21 @@ def check_whole(robots: Robots) -> None:
         assert robots._ask(query) == 0, query
 
 
+def test_what_was_asked_before_the_first_tombstone_counts_it_afterwards(robots: Robots) -> None:
+    """Statements on named relatives are planned once: that of every process must be planned anew."""
+    part = ended()
+    over = whole(part)
+    robots.store.commit_all(arrivals(part, over))
+    second = robots.another()
+    asked = Query(cue=cues.parts("superset", [part.uid]))
+    for store in (robots.store, second):
+        for _ in range(3):
+            assert [event.uid for event in store.find(asked)] == [over.uid]
+    forget(robots.store, [part.uid])
+    for store in (robots.store, second):
+        assert [event.uid for event in store.find(asked)] == [over.uid]
+
+
 # A part goes while its whole comes
 
 

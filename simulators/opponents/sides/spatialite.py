@@ -17,18 +17,8 @@ from typing import Any
 import apsw
 
 from simulators.opponents.protocol import Question, Record, Ring, Workload, everything_but, serve
-from simulators.opponents.sides.sqlite_tables import (
-    COLUMNS,
-    DURABILITY,
-    SEARCHES,
-    Found,
-    create,
-    keep,
-    order_of,
-    row_of,
-    settle,
-    values_of,
-)
+from simulators.opponents.sides.sqlite_file import FIRST_RADIUS, ROUNDING, SqliteFile
+from simulators.opponents.sides.sqlite_tables import COLUMNS, Found, keep, order_of, row_of
 
 _EXTENSION = "mod_spatialite"
 _PLACE = (
@@ -63,12 +53,9 @@ _PLACES: Mapping[str, str] = MappingProxyType(
 _NEAREST = (
     f"{_INDEX} WHERE {_MEETING} AND {_NEAR} ORDER BY ST_Distance(p.region, MakePoint(:x, :y)), e.number LIMIT :limit"
 )
-_ROUNDING = 1e-3
-"""Metres by which a box of float32 may be wider than its region, at most."""
-_FIRST_RADIUS = 1.0
 
 
-class SpatiaLite:
+class SpatiaLite(SqliteFile):
     """A file of SpatiaLite, written and asked through apsw."""
 
     name = "spatialite"
@@ -77,54 +64,20 @@ class SpatiaLite:
         "SQLite in the user's own process, with exact polygons: no round trip to a server, one writer; its triggers "
         "check each polygon in SQL."
     )
-    durability: Mapping[str, str] = DURABILITY
     abilities = everything_but({}, filtered=("nearest",))
+    places = _PLACES
 
     def __init__(self, workload: Workload, directory: Path, mode: str, dsn: str | None) -> None:
-        self._connection = apsw.Connection(str(directory / "events.spatialite"))
-        self._connection.enable_load_extension(True)
-        self._connection.load_extension(_EXTENSION)
-        create(self._connection, workload, mode)
-        for statement in _PLACE:
-            self._connection.execute(statement).fetchall()
-        settle(self._connection)
+        connection = apsw.Connection(str(directory / "events.spatialite"))
+        connection.enable_load_extension(True)
+        connection.load_extension(_EXTENSION)
+        super().__init__(connection, workload, mode, _PLACE)
 
     def version(self) -> str:
         """Those of SpatiaLite, its GEOS, and SQLite."""
         found = self._connection.execute("SELECT spatialite_version(), geos_version(), sqlite_version()").fetchall()
         spatialite, geos, sqlite = found[0]
         return f"{spatialite}, GEOS {geos}, SQLite {sqlite}"
-
-    def commit(self, record: Record) -> object:
-        """One transaction."""
-        self._connection.execute("BEGIN")
-        self._keep(record)
-        return self._connection.execute("COMMIT")
-
-    def load(self, records: Sequence[Record]) -> None:
-        """One transaction for all, statistics for the planner, and a checkpoint."""
-        self._connection.execute("BEGIN")
-        for record in records:
-            self._keep(record)
-        self._connection.execute("COMMIT")
-        settle(self._connection)
-
-    def ask(self, question: Question) -> Sequence[Found]:
-        """Rows as tuples."""
-        values = values_of(question)
-        if question.kind == "nearest":
-            return self._nearest(question, values)
-        if question.kind not in _PLACES:
-            return self._found(f"{SEARCHES[question.kind]}{order_of(question)}", values)
-        return self._found(f"{_PLACES[question.kind]}{order_of(question)}", values | _place(question))
-
-    def uid_of(self, row: Found) -> str:
-        """Its uid."""
-        return row.uid
-
-    def close(self) -> None:
-        """Close the file."""
-        self._connection.close()
 
     def _keep(self, record: Record) -> None:
         row = row_of(record)
@@ -133,16 +86,18 @@ class SpatiaLite:
         else:
             keep(self._connection, row | {"region": _wkb(record.ring)}, _INSERT_PLACE)
 
+    def _placed(self, question: Question, values: Mapping[str, Any]) -> list[Found]:
+        return self._found(f"{_PLACES[question.kind]}{order_of(question)}", {**values, **_place(question)})
+
     def _found(self, search: str, values: Mapping[str, Any]) -> list[Found]:
         region = "p.region" if " place p " in search else "(SELECT region FROM place q WHERE q.number = e.number)"
         rows = self._connection.execute(f"SELECT {COLUMNS}, ST_AsBinary({region}) FROM {search}", values)
         return list(map(Found._make, rows))
 
     def _nearest(self, question: Question, values: Mapping[str, Any]) -> list[Found]:
-        """Boxes around the point, each twice as large as the one before, until enough regions are that near."""
         x, y = question.value["x"], question.value["y"]
         ((everything,),) = self._connection.execute("SELECT count(*) FROM place").fetchall()
-        radius = _FIRST_RADIUS
+        radius = FIRST_RADIUS
         while True:
             found = self._found(_NEAREST, {**values, **_around(x, y, radius)})
             if len(found) >= min(question.limit or everything, everything):
@@ -155,7 +110,7 @@ def _place(question: Question) -> dict[str, Any]:
     if question.kind.startswith("near"):
         return _around(asked["x"], asked["y"], asked["metres"])
     xs, ys = [x for x, _ in asked], [y for _, y in asked]
-    wider = _ROUNDING if question.kind == "region.subset" else 0.0
+    wider = ROUNDING if question.kind == "region.subset" else 0.0
     box = {"west": min(xs) - wider, "south": min(ys) - wider, "east": max(xs) + wider, "north": max(ys) + wider}
     return {**box, "region": _wkb(asked)}
 

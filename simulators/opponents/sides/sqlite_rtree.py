@@ -11,7 +11,7 @@ times alone. Regions are kept as well-known binary: SQLite prunes by boxes, and 
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from importlib.metadata import version
 from itertools import islice
 from pathlib import Path
@@ -21,18 +21,8 @@ from typing import Any
 import shapely
 
 from simulators.opponents.protocol import Question, Record, Workload, everything_but, serve
-from simulators.opponents.sides.sqlite_tables import (
-    COLUMNS,
-    DURABILITY,
-    SEARCHES,
-    Found,
-    create,
-    keep,
-    order_of,
-    row_of,
-    settle,
-    values_of,
-)
+from simulators.opponents.sides.sqlite_file import FIRST_RADIUS, ROUNDING, SqliteFile, square
+from simulators.opponents.sides.sqlite_tables import COLUMNS, Found, keep, row_of
 
 _PLACE = (
     "CREATE VIRTUAL TABLE box USING rtree (number, west, east, south, north, begins, ends)",
@@ -64,14 +54,11 @@ _PLACES: Mapping[str, str] = MappingProxyType(
         "nearest": f"{_BOX} WHERE {_MEETING}",
     }
 )
-_ROUNDING = 1e-3
-"""Metres by which a box of float32 may be wider than its region, at most."""
-_FIRST_RADIUS = 1.0
 
 Test = Callable[[Any], bool]
 
 
-class SqliteRtree:
+class SqliteRtree(SqliteFile):
     """A file of SQLite, written and asked through Python's `sqlite3`."""
 
     name = "sqlite_rtree"
@@ -80,54 +67,16 @@ class SqliteRtree:
         "A library in the user's own process: no round trip to a server, so what is small and by key is hard to beat; "
         "it knows boxes only, and Python tests the polygons."
     )
-    durability: Mapping[str, str] = DURABILITY
     abilities = everything_but({}, filtered=tuple(_PLACES))
+    places = _PLACES
 
     def __init__(self, workload: Workload, directory: Path, mode: str, dsn: str | None) -> None:
-        self._connection = sqlite3.connect(directory / "events.sqlite", isolation_level=None)
-        create(self._connection, workload, mode)
-        for statement in _PLACE:
-            self._connection.execute(statement)
-        settle(self._connection)
+        connection = sqlite3.connect(directory / "events.sqlite", isolation_level=None)
+        super().__init__(connection, workload, mode, _PLACE)
 
     def version(self) -> str:
         """Those of SQLite and shapely."""
         return f"{sqlite3.sqlite_version}, shapely {version('shapely')}"
-
-    def commit(self, record: Record) -> object:
-        """One transaction."""
-        self._connection.execute("BEGIN")
-        self._keep(record)
-        return self._connection.execute("COMMIT")
-
-    def load(self, records: Sequence[Record]) -> None:
-        """One transaction for all, statistics for the planner, and a checkpoint."""
-        self._connection.execute("BEGIN")
-        for record in records:
-            self._keep(record)
-        self._connection.execute("COMMIT")
-        settle(self._connection)
-
-    def ask(self, question: Question) -> Sequence[Found]:
-        """Rows as tuples; where places matter, those of the boxes that shapely confirms."""
-        values = values_of(question)
-        if question.kind == "nearest":
-            return self._nearest(question, values)
-        if question.kind not in _PLACES:
-            return self._found(f"{SEARCHES[question.kind]}{order_of(question)}", values)
-        box, test = _exact(question)
-        # The limit counts what is confirmed.
-        order = "" if question.limit is None else " ORDER BY e.begins, e.number"
-        rows = self._rows(f"{_PLACES[question.kind]}{order}", values | box)
-        return list(islice(filter(lambda row: test(row.region), rows), question.limit))
-
-    def uid_of(self, row: Found) -> str:
-        """Its uid."""
-        return row.uid
-
-    def close(self) -> None:
-        """Close the file."""
-        self._connection.close()
 
     def _keep(self, record: Record) -> None:
         row = row_of(record)
@@ -139,6 +88,14 @@ class SqliteRtree:
         box = {"west": west, "south": south, "east": east, "north": north}
         keep(self._connection, row | box | {"region": region.wkb}, _INSERT_PLACE)
 
+    def _placed(self, question: Question, values: Mapping[str, Any]) -> list[Found]:
+        """Those of the boxes that shapely confirms."""
+        box, test = _exact(question)
+        # The limit counts what is confirmed.
+        order = "" if question.limit is None else " ORDER BY e.begins, e.number"
+        rows = self._rows(f"{_PLACES[question.kind]}{order}", {**values, **box})
+        return list(islice(filter(lambda row: test(row.region), rows), question.limit))
+
     def _rows(self, search: str, values: Mapping[str, Any]) -> Iterable[Found]:
         return map(Found._make, self._connection.execute(f"SELECT {COLUMNS}, {_REGION} FROM {search}", values))
 
@@ -146,13 +103,12 @@ class SqliteRtree:
         return list(self._rows(search, values))
 
     def _nearest(self, question: Question, values: Mapping[str, Any]) -> list[Found]:
-        """Boxes around the point, each twice as large as the one before, until enough regions are that near."""
         x, y = question.value["x"], question.value["y"]
-        point, radius = shapely.Point(x, y), _FIRST_RADIUS
+        point, radius = shapely.Point(x, y), FIRST_RADIUS
         (everything,) = self._connection.execute("SELECT count(*) FROM place").fetchone()
         search = f"SELECT e.number, {_REGION} FROM {_PLACES['nearest']}"
         while True:
-            rows = self._connection.execute(search, {**values, **_square(x, y, radius)}).fetchall()
+            rows = self._connection.execute(search, {**values, **square(x, y, radius)}).fetchall()
             distances = shapely.distance(shapely.from_wkb([region for _, region in rows]), point).tolist()
             ranked = sorted(zip(distances, (number for number, _ in rows), strict=True))
             near = [number for distance, number in ranked if distance <= radius][: question.limit]
@@ -168,13 +124,13 @@ def _exact(question: Question) -> tuple[dict[str, float], Test]:
     if question.kind.startswith("near"):
         point, metres = shapely.Point(asked["x"], asked["y"]), asked["metres"]
         shapely.prepare(point)
-        return _square(asked["x"], asked["y"], metres), lambda region: bool(
+        return square(asked["x"], asked["y"], metres), lambda region: bool(
             shapely.dwithin(shapely.from_wkb(region), point, metres)
         )
     polygon = shapely.Polygon(asked)
     shapely.prepare(polygon)
     west, south, east, north = polygon.bounds
-    wider = _ROUNDING if question.kind == "region.subset" else 0.0
+    wider = ROUNDING if question.kind == "region.subset" else 0.0
     box = {"west": west - wider, "south": south - wider, "east": east + wider, "north": north + wider}
     tests: Mapping[str, Callable[[Any], Any]] = {
         "region.equal": polygon.equals,
@@ -184,10 +140,6 @@ def _exact(question: Question) -> tuple[dict[str, float], Test]:
     }
     test = tests[question.kind]
     return box, lambda region: bool(test(shapely.from_wkb(region)))
-
-
-def _square(x: float, y: float, radius: float) -> dict[str, float]:
-    return {"west": x - radius, "east": x + radius, "south": y - radius, "north": y + radius}
 
 
 if __name__ == "__main__":

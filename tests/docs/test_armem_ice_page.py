@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import re
 from importlib import import_module
 
 import pytest
@@ -13,10 +12,10 @@ from armem_bridge.ice.communicators import MESSAGE_KILOBYTES, PROPERTIES
 from armem_bridge.ice.edge import NAME_SYSTEM, EdgeStatus, topic_of
 from armem_bridge.ice.standalone import PORT
 from armem_bridge.ice.wire.aron import ELEMENTS_LIMIT
-from tests.armem.ice.processes import ROOT
+from tests.pages import Page
 
-PAGE = (ROOT / "docs" / "armem_ice.md").read_text(encoding="utf-8")
-BLOCKS = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+PAGE = Page("docs/armem_ice.md")
+BLOCKS = PAGE.blocks("python")
 
 
 @pytest.mark.parametrize("block", BLOCKS, ids=range(len(BLOCKS)))
@@ -32,12 +31,12 @@ def test_what_the_examples_import_is_there(block: str) -> None:
 
 def test_its_numbers_are_those_of_the_code() -> None:
     assert MESSAGE_KILOBYTES == 1024 * 1024
-    assert "up to 1 GiB" in PAGE
-    assert f"up to {PROPERTIES['Ice.ThreadPool.Server.SizeMax']} threads" in PAGE
-    assert f"more than {DEPTH_LIMIT} levels" in PAGE
+    assert "up to 1 GiB" in PAGE.text
+    assert f"up to {PROPERTIES['Ice.ThreadPool.Server.SizeMax']} threads" in PAGE.text
+    assert f"more than {DEPTH_LIMIT} levels" in PAGE.text
     assert ELEMENTS_LIMIT == 1_000_000
-    assert "or a million elements" in PAGE
-    assert f"-p {PORT}" in PAGE
-    assert NAME_SYSTEM in PAGE
-    assert topic_of("<memory>") in PAGE
+    assert "or a million elements" in PAGE.text
+    assert f"-p {PORT}" in PAGE.text
+    assert NAME_SYSTEM in PAGE.text
+    assert topic_of("<memory>") in PAGE.text
     assert {"untimed", "versions"} <= set(EdgeStatus.__struct_fields__)
