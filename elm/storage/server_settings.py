@@ -26,6 +26,8 @@ def default_settings(socket_directory: Path) -> dict[str, str]:
         "max_wal_size": "4GB",
         "checkpoint_timeout": "15min",
         "log_checkpoints": "off",
+        # A memory grows from nothing to thousands of events in seconds; until the planner knows, it reads far more.
+        "autovacuum_naptime": "10s",
         "timezone": "UTC",
         "log_timezone": "UTC",
         "jit": "off",

@@ -124,6 +124,7 @@ def test_up_makes_a_server_with_the_extensions(cluster: Cluster) -> None:
         ("fsync", "on"),
         ("synchronous_commit", "on"),
         ("max_wal_size", "4GB"),
+        ("autovacuum_naptime", "10s"),
         ("max_connections", "100"),
         ("TimeZone", "UTC"),
         ("jit", "off"),
