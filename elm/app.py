@@ -11,8 +11,9 @@ from uuid import UUID
 from elm.cues.algebra import Cue
 from elm.event import Event, StoredEvent
 from elm.log import Log, LoggedStore, LogKind, Tick
+from elm.query import Cursor, Order
 from elm.recollector import OrderName, Recollection, Recollector
-from elm.store import Arrival, Closed, Committed, Cursor, Order, Statistics, TypesAdded
+from elm.store import Arrival, Closed, Committed, Statistics, TypesAdded
 from elm.subscription import subscribe
 from elm.taxonomy import EventType
 from elm.writer import LOAD_BATCH, LoadReport, Writer

@@ -19,8 +19,8 @@ from elm.event import StoredEvent
 from elm.exchange import event_to_json, to_line, tombstone_to_json
 from elm.fields import time_text
 from elm.geometry import Region
+from elm.query import Order, Query
 from elm.recollector import Recollection
-from elm.store import Order, Query
 from elm.tombstone import RunTombstone, Tombstone
 
 _CHUNK = 1_000

@@ -13,8 +13,8 @@ from uuid_utils.compat import uuid7
 from elm.cues.algebra import Cue, UidCue
 from elm.errors import InvalidValue
 from elm.log import Consumer, LoggedStore
+from elm.query import Order, Query
 from elm.recognition.checkpoint import held_events
-from elm.store import Order, Query
 from elm.tombstone import Forgotten
 
 FORGET_BATCH = 2_000

@@ -12,7 +12,8 @@ from typing import Any, Protocol
 from elm.errors import ConsumerBusy, InvalidValue, PositionLost, UnknownConsumer
 from elm.event import StoredEvent
 from elm.interval import as_utc
-from elm.store import MOST_ID, Arrival, Committed, Store
+from elm.query import MOST_ID
+from elm.store import Arrival, Committed, Store
 from elm.text import check_short_name
 
 

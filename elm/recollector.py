@@ -7,23 +7,12 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 from uuid import UUID
 
-from elm.cues.algebra import And, Cue, UidCue, named
+from elm.cues.algebra import And, Cue, UidCue
+from elm.cues.relations import named
 from elm.errors import InvalidValue, MissingPackage, UnknownEvent
 from elm.event import StoredEvent
-from elm.store import (
-    ByFeature,
-    Cursor,
-    Explanation,
-    Group,
-    Grouping,
-    Join,
-    JoinRelation,
-    Nearest,
-    Order,
-    Page,
-    Query,
-    Store,
-)
+from elm.query import ByFeature, Cursor, Explanation, Group, Grouping, Join, JoinRelation, Nearest, Order, Page, Query
+from elm.store import Store
 
 OrderName = Order | Nearest | Literal["begin", "-begin", "id"]
 GroupingName = Grouping | ByFeature | Literal["type", "agent", "frame", "day", "hour"]

@@ -10,7 +10,7 @@ from elm.cues.algebra import And, Cue, UidCue
 from elm.errors import InvalidValue, StoreClosed
 from elm.event import StoredEvent
 from elm.log import LogEntry, LoggedStore, Step, check_position
-from elm.store import Query
+from elm.query import Query
 
 PAGE = 1_000
 """Entries of the log that are looked at together, and after which a named subscription keeps its place."""

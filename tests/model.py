@@ -8,8 +8,9 @@ from uuid import UUID
 
 from shapely.geometry import MultiPoint
 
-from elm.cues.algebra import Cue, Kin
+from elm.cues.algebra import Cue
 from elm.cues.match import match
+from elm.cues.relations import Kin
 from elm.event import Event, StoredEvent
 from elm.geometry import Region
 from elm.interval import Interval

@@ -14,7 +14,8 @@ from hypothesis.strategies import SearchStrategy
 from shapely.geometry import Polygon
 
 from elm import cues
-from elm.cues.algebra import Comparison, Cue, SetRelation
+from elm.cues.algebra import Cue
+from elm.cues.relations import Comparison, SetRelation
 from elm.event import Event, Payload
 from elm.features import FeatureValue
 from elm.geometry import Region, SpatialRelation

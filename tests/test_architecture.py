@@ -18,10 +18,12 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("elm.text",),
     ("elm.interval", "elm.geometry", "elm.features", "elm.taxonomy", "elm.fields"),
     ("elm.event", "elm.tombstone"),
+    ("elm.cues.relations",),
     ("elm.cues.algebra", "elm.exchange", "elm.columns", "elm.wordnet"),
     ("elm.cues.build", "elm.cues.codec", "elm.cues.match"),
     ("elm.cues",),
     # The ports, and the services that know nothing else.
+    ("elm.query",),
     ("elm.store",),
     ("elm.log",),
     ("elm.writer", "elm.recollector", "elm.recognizers", "elm.monitors"),

@@ -15,7 +15,8 @@ from uuid import UUID
 from shapely.geometry import Polygon
 
 from elm import cues
-from elm.cues.algebra import Comparison, Cue, Kin, KinCue, SetRelation, TimeAxis, TimeCue
+from elm.cues.algebra import Cue, KinCue, TimeCue
+from elm.cues.relations import Comparison, Kin, SetRelation, TimeAxis
 from elm.event import Event, Payload
 from elm.features import FeatureValue
 from elm.geometry import Region

@@ -67,7 +67,7 @@ def _parts(asked: Answering, parent: MemoryID, form: RowFormat) -> Iterable[tupl
         from armem_bridge.long_term.mapping import NAMES, below
         from elm.errors import MemoryMissing
         from elm.interval import to_micros
-        from elm.store import ByFeature
+        from elm.query import ByFeature
 
         try:
             groups = list(asked.elm.recall(below(parent)).groups(ByFeature(name=NAMES[parent.level])))

@@ -11,7 +11,7 @@ from armem_bridge.long_term.mapping import ID, below
 from armem_bridge.memory_id import InvalidMemoryID, Level, MemoryID
 from elm.app import Memory
 from elm.errors import MemoryMissing
-from elm.store import ByFeature
+from elm.query import ByFeature
 
 MAX_AGE: Final = 300.0
 """After so many seconds the names are looked up again, for other processes may have written some."""

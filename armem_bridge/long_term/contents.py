@@ -9,7 +9,7 @@ from armem_bridge.long_term.source import LongTermSource
 from armem_bridge.memory_id import MemoryID
 from elm.app import Memory
 from elm.errors import MemoryMissing
-from elm.store import ByFeature
+from elm.query import ByFeature
 
 
 def memory_names(elm: Memory) -> Sequence[str]:

@@ -16,8 +16,8 @@ from elm.cues import any_of, features, time
 from elm.cues.algebra import Cue
 from elm.event import StoredEvent
 from elm.interval import Interval
+from elm.query import Cursor, Nearest, Order
 from elm.recollector import PAGE, OrderName, Recollection
-from elm.store import Cursor, Nearest, Order
 
 _TOGETHER: Final = 50
 """Of so many snapshots at once it is asked whether other versions of them count."""

@@ -18,7 +18,7 @@ from elm.cues import time
 from elm.cues.algebra import Cue
 from elm.errors import MemoryMissing
 from elm.interval import to_micros
-from elm.store import ByFeature, Cursor, Group
+from elm.query import ByFeature, Cursor, Group
 
 PAGE: Final = 500
 """At most so many events are read at once."""

@@ -73,7 +73,7 @@ def stats(
 
 
 def _grouping(by: str) -> GroupingName:
-    from elm.store import ByFeature, Grouping
+    from elm.query import ByFeature, Grouping
 
     kind, colon, name = by.partition(":")
     if kind == "feature" and colon:

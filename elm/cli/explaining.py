@@ -12,7 +12,7 @@ from elm.cli.event_table import cell, plain_table
 from elm.cli.terminal import answers, visible, write
 
 if TYPE_CHECKING:
-    from elm.store import Explanation
+    from elm.query import Explanation
 
 
 def write_explanation(explanation: Explanation, form: EventFormat) -> None:

@@ -16,7 +16,7 @@ from elm.cli.option_groups import takes_groups
 from elm.cli.terminal import say
 
 if TYPE_CHECKING:
-    from elm.store import Cursor
+    from elm.query import Cursor
 
 TABLE_LIMIT = 100
 """Rows of a table unless asked otherwise."""
@@ -75,7 +75,7 @@ def recall(
 
 def _cursor(after: str | None) -> Cursor | None:
     from elm.errors import InvalidValue
-    from elm.store import Cursor
+    from elm.query import Cursor
 
     try:
         return None if after is None else Cursor.parse(after)
@@ -84,7 +84,7 @@ def _cursor(after: str | None) -> Cursor | None:
 
 
 def _cursor_after(shown: Counted) -> Cursor:
-    from elm.store import Cursor
+    from elm.query import Cursor
 
     assert shown.last is not None  # noqa: S101 - asked for only when events were shown
     return Cursor.after(shown.last)

@@ -10,27 +10,20 @@ from uuid import UUID
 from elm.cues.algebra import (
     AgentCue,
     And,
-    Comparison,
     Cue,
     DurationCue,
     FeatureCue,
     FeatureNamesCue,
     FeaturesCue,
-    Kin,
     KinCue,
     Or,
     PayloadCue,
-    Place,
     RegionCue,
-    SetRelation,
-    TimeAxis,
     TimeCue,
     TypeCue,
-    TypeRelation,
     UidCue,
-    named,
-    time_relation,
 )
+from elm.cues.relations import Comparison, Kin, Place, SetRelation, TimeAxis, TypeRelation, named, time_relation
 from elm.errors import InvalidValue
 from elm.features import FeatureValue, as_features
 from elm.geometry import Region, SpatialRelation

@@ -11,29 +11,22 @@ from elm.cues.algebra import (
     DEPTH_LIMIT,
     AgentCue,
     And,
-    Comparison,
     Cue,
     DurationCue,
     FeatureCue,
     FeatureNamesCue,
     FeaturesCue,
-    Kin,
     KinCue,
     Not,
     Or,
     PayloadCue,
-    Place,
     RegionCue,
-    SetRelation,
-    TimeAxis,
     TimeCue,
     TypeCue,
-    TypeRelation,
     UidCue,
-    named,
     node,
-    time_relation,
 )
+from elm.cues.relations import Comparison, Kin, Place, SetRelation, TimeAxis, TypeRelation, named, time_relation
 from elm.errors import InvalidValue
 from elm.features import as_features
 from elm.fields import Fields, base64_text, time_text

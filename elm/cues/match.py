@@ -12,27 +12,22 @@ from uuid import UUID
 from elm.cues.algebra import (
     AgentCue,
     And,
-    Comparison,
     Cue,
     DurationCue,
     FeatureCue,
     FeatureNamesCue,
     FeaturesCue,
-    Kin,
     KinCue,
     Not,
     Or,
     PayloadCue,
-    Place,
     RegionCue,
-    SetRelation,
-    TimeAxis,
     TimeCue,
     TypeCue,
-    TypeRelation,
     UidCue,
     node,
 )
+from elm.cues.relations import Comparison, Kin, Place, SetRelation, TimeAxis, TypeRelation
 from elm.event import StoredEvent
 from elm.features import identity, kind_of
 from elm.geometry import SpatialRelation

@@ -22,7 +22,7 @@ from elm.app import Memory
 from elm.demo.plaza import beacon_places
 from elm.demo.style import CONTACT, GROUND, INK, MOTIONS, MUTED, PAPER, inside, minutes, quiet, since
 from elm.event import StoredEvent
-from elm.store import ByFeature
+from elm.query import ByFeature
 
 COLOURS = "viridis"
 TITLES = {

@@ -17,8 +17,8 @@ from elm.demo.recording import RUNS
 from elm.demo.words import at, clock, doing, duration, lasted, listed, named, number, numbers, run_of
 from elm.event import StoredEvent
 from elm.geometry import Region
+from elm.query import ByFeature, Nearest
 from elm.recollector import OrderName, Recollection
-from elm.store import ByFeature, Nearest
 
 MIDDLE = Region.around(-20.0, 25.0, 0.1, frame="plaza1")
 """A point in the middle of the first plaza."""

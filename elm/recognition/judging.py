@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Set
 from uuid import UUID
 
-from elm.cues.algebra import And, Cue, FeatureNamesCue, Kin, Not, Or, SetRelation, TypeCue, TypeRelation, node
+from elm.cues.algebra import And, Cue, FeatureNamesCue, Not, Or, TypeCue, node
 from elm.cues.match import match
+from elm.cues.relations import Kin, SetRelation, TypeRelation
 from elm.errors import UnknownType
 from elm.event import StoredEvent
 from elm.taxonomy import EventType, Taxonomy

@@ -6,10 +6,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from uuid import UUID
 
-from elm.cues.algebra import FeaturesCue, Not, SetRelation, TypeCue, TypeRelation, UidCue
+from elm.cues.algebra import FeaturesCue, Not, TypeCue, UidCue
+from elm.cues.relations import SetRelation, TypeRelation
 from elm.errors import InvalidValue
 from elm.event import Event
 from elm.log import LoggedStore
+from elm.query import Query
 from elm.recognition.clocks import Timing
 from elm.recognition.enrolment import known_strands, refuse_changed
 from elm.recognition.fold import Fold, Taken
@@ -18,7 +20,7 @@ from elm.recognition.keeping import keep_results
 from elm.recognition.manager import BATCH
 from elm.recognition.work import Work
 from elm.recognizers.base import DEADLINE, RECOGNIZER, VERSION, Recognizer
-from elm.store import Arrival, Query
+from elm.store import Arrival
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Literal, assert_never
 
-from elm.cues.algebra import Comparison, Place, named
 from elm.cues.match import COMPARE
+from elm.cues.relations import Comparison, Place, named
 from elm.errors import InvalidValue
 from elm.event import StoredEvent
 from elm.features import identity, kind_of

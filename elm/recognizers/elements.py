@@ -7,7 +7,8 @@ from datetime import timedelta
 from enum import StrEnum
 from typing import Self
 
-from elm.cues.algebra import Cue, named
+from elm.cues.algebra import Cue
+from elm.cues.relations import named
 from elm.errors import InvalidValue
 from elm.recognizers.conditions import Condition
 from elm.recognizers.durations import check_duration

@@ -8,7 +8,8 @@ from datetime import timedelta
 from enum import StrEnum
 from typing import Any, ClassVar, Literal
 
-from elm.cues.algebra import Cue, Or, named
+from elm.cues.algebra import Cue, Or
+from elm.cues.relations import named
 from elm.errors import InvalidValue
 from elm.interval import from_micros
 from elm.recognizers.base import DEADLINE, Emission, Fed, Judge, Process, check_feature

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import assert_never
 
-from elm.cues.algebra import named
+from elm.cues.relations import named
 from elm.errors import InvalidValue
 from elm.event import StoredEvent
 from elm.features import FeatureValue, kind_of

@@ -8,7 +8,8 @@ from datetime import timedelta
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
-from elm.cues.algebra import And, Cue, Or, named
+from elm.cues.algebra import And, Cue, Or
+from elm.cues.relations import named
 from elm.errors import InvalidValue
 from elm.recognizers.base import DEADLINE, Fed, Judge, Process, check_count, check_identity
 from elm.recognizers.durations import check_duration, micros_of

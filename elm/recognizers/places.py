@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from datetime import timedelta
 from typing import Any, Literal
 
-from elm.cues.algebra import Cue, Place, RegionCue, named
+from elm.cues.algebra import Cue, RegionCue
+from elm.cues.relations import Place, named
 from elm.errors import InvalidValue
 from elm.event import StoredEvent
 from elm.geometry import LIMIT, Region, SpatialRelation

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from elm.cues.algebra import And, Cue, Kin, KinCue, Not, Or, TimeAxis, TimeCue, node
+from elm.cues.algebra import And, Cue, KinCue, Not, Or, TimeCue, node
+from elm.cues.relations import Kin, TimeAxis
 from elm.errors import InvalidValue
 
 

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from datetime import timedelta
 from typing import Any, ClassVar, Literal
 
-from elm.cues.algebra import Cue, Or, Place, named
+from elm.cues.algebra import Cue, Or
+from elm.cues.relations import Place, named
 from elm.recognizers.base import Emission, Fed, Judge, Process
 from elm.recognizers.conditions import Condition, Near, Same
 from elm.recognizers.durations import later, micros_of

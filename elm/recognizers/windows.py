@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from datetime import timedelta
 from typing import Any, Self
 
-from elm.cues.algebra import Comparison, Cue, FeatureCue, named
+from elm.cues.algebra import Cue, FeatureCue
 from elm.cues.match import COMPARE
+from elm.cues.relations import Comparison, named
 from elm.errors import InvalidValue
 from elm.features import Feature, FeatureValue, canonical, kind_of
 from elm.recognizers.base import Emission, Fed, Judge, Process

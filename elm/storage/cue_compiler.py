@@ -37,10 +37,10 @@ from elm.cues.algebra import (
     RegionCue,
     TimeCue,
     TypeCue,
-    TypeRelation,
     UidCue,
     node,
 )
+from elm.cues.relations import TypeRelation
 from elm.storage.conditions.kin import kin
 from elm.storage.conditions.rule import UIDS, Bind, Condition, Names, Rule, indexed
 from elm.storage.conditions.what import feature, feature_names, features

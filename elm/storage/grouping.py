@@ -9,9 +9,9 @@ from typing import Any
 import msgspec
 
 from elm.features import identity, kind_of
+from elm.query import ByFeature, Group, Grouping
 from elm.storage.names import NameCache
 from elm.storage.rows import moment
-from elm.store import ByFeature, Group, Grouping
 
 
 def merged(rows: Sequence[Sequence[Any]], by: Grouping | ByFeature, names: NameCache) -> list[Group]:

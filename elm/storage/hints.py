@@ -2,19 +2,8 @@
 
 from __future__ import annotations
 
-from elm.cues.algebra import (
-    And,
-    Cue,
-    DurationCue,
-    KinCue,
-    PayloadCue,
-    SetRelation,
-    TimeAxis,
-    TimeCue,
-    TypeCue,
-    TypeRelation,
-    UidCue,
-)
+from elm.cues.algebra import And, Cue, DurationCue, KinCue, PayloadCue, TimeCue, TypeCue, UidCue
+from elm.cues.relations import SetRelation, TimeAxis, TypeRelation
 from elm.interval import AllenRelation, Window
 
 

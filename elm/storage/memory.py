@@ -17,27 +17,13 @@ from elm.errors import StoreClosed
 from elm.event import StoredEvent, content_hash
 from elm.exchange import to_line
 from elm.interval import as_utc
+from elm.query import ByFeature, ConditionRows, Explanation, Group, Grouping, Join, Nearest, Query
 from elm.storage.memory_answers import grouped, nearest_first, neighbours
 from elm.storage.memory_changes import Changes
 from elm.storage.memory_forgetting import Forgetting
 from elm.storage.memory_index import EventIndex, View, conjuncts
 from elm.storage.memory_log import MemoryLog
-from elm.store import (
-    Arrival,
-    BatchReport,
-    ByFeature,
-    Closed,
-    Committed,
-    ConditionRows,
-    Explanation,
-    Group,
-    Grouping,
-    Join,
-    Nearest,
-    Query,
-    Statistics,
-    TypesAdded,
-)
+from elm.store import Arrival, BatchReport, Closed, Committed, Statistics, TypesAdded
 from elm.taxonomy import EventType, Taxonomy
 from elm.tombstone import Forgotten, RunTombstone, Tombstone
 

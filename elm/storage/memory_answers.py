@@ -11,11 +11,11 @@ from typing import Any, assert_never
 import numpy as np
 import shapely
 
-from elm.cues.algebra import Place
+from elm.cues.relations import Place
 from elm.event import StoredEvent
 from elm.features import FeatureValue, kind_of
 from elm.geometry import Region
-from elm.store import ByFeature, Group, Grouping, JoinRelation, Nearest
+from elm.query import ByFeature, Group, Grouping, JoinRelation, Nearest
 
 _Key = tuple[str, Any]
 """Kind and value: kinds never compare with each other, and Python's True == 1 must not merge two keys."""

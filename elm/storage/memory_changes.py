@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from uuid import UUID
 
-from elm.cues.algebra import Kin
+from elm.cues.relations import Kin
 from elm.errors import ConflictingContent, ElmError, ForgottenEvent, InvalidValue, UnknownEvent
 from elm.event import Event, StoredEvent, content_hash
 from elm.interval import Interval, as_utc

@@ -10,13 +10,14 @@ from uuid import UUID
 from rtree.index import Index
 from sortedcontainers import SortedKeyList
 
-from elm.cues.algebra import And, Condition, Cue, Kin, KinCue, Not, Or, Place, RegionCue, SetRelation, TypeCue, UidCue
+from elm.cues.algebra import And, Condition, Cue, KinCue, Not, Or, RegionCue, TypeCue, UidCue
 from elm.cues.match import match
+from elm.cues.relations import Kin, Place, SetRelation
 from elm.event import StoredEvent
 from elm.geometry import SpatialRelation
 from elm.interval import to_micros
+from elm.query import Cursor, Nearest, Order, Query
 from elm.storage.memory_events import changed
-from elm.store import Cursor, Nearest, Order, Query
 from elm.taxonomy import Taxonomy
 from elm.tombstone import Tombstone
 

@@ -17,6 +17,7 @@ from elm.cues.codec import cue_to_json
 from elm.event import StoredEvent
 from elm.exchange import to_line
 from elm.interval import Window
+from elm.query import MOST_ID, ByFeature, ConditionRows, Explanation, Group, Grouping, Join, Nearest, Query
 from elm.storage import batch_loading, event_writing, grouping, hints, recall_statements, type_writing
 from elm.storage import write_statements as sql
 from elm.storage.batch import made_ready
@@ -27,23 +28,7 @@ from elm.storage.postgres_log import PostgresLog
 from elm.storage.rows import moment
 from elm.storage.session import Session
 from elm.storage.writing_together import Together
-from elm.store import (
-    MOST_ID,
-    Arrival,
-    BatchReport,
-    ByFeature,
-    Closed,
-    Committed,
-    ConditionRows,
-    Explanation,
-    Group,
-    Grouping,
-    Join,
-    Nearest,
-    Query,
-    Statistics,
-    TypesAdded,
-)
+from elm.store import Arrival, BatchReport, Closed, Committed, Statistics, TypesAdded
 from elm.taxonomy import EventType
 
 CHUNK = 1_000

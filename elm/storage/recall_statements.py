@@ -32,6 +32,7 @@ from sqlalchemy.dialects.postgresql import psycopg
 
 from elm.cues.algebra import And, Cue
 from elm.interval import Window
+from elm.query import ByFeature, Grouping, Join, JoinRelation, Nearest, Query
 from elm.storage.cue_compiler import CompiledCue
 from elm.storage.row_search import (
     GLANCE_FACTOR,
@@ -49,7 +50,6 @@ from elm.storage.row_search import (
 )
 from elm.storage.row_search import WALK_MOST as WALK_MOST
 from elm.storage.tables import event, part
-from elm.store import ByFeature, Grouping, Join, JoinRelation, Nearest, Query
 
 DIALECT = psycopg.dialect()  # type: ignore[no-untyped-call]
 _TIME = TIMESTAMP(timezone=True)

@@ -27,13 +27,14 @@ from sqlalchemy import (
     union_all,
 )
 
-from elm.cues.algebra import And, Place
+from elm.cues.algebra import And
+from elm.cues.relations import Place
 from elm.interval import Window
+from elm.query import Nearest, Order, Query
 from elm.storage.conditions.rule import Bind, Condition
 from elm.storage.cue_compiler import CompiledCue
 from elm.storage.hints import is_guess, is_in_order
 from elm.storage.tables import event, frame
-from elm.store import Nearest, Order, Query
 
 _TIME = TIMESTAMP(timezone=True)
 

@@ -9,12 +9,12 @@ from uuid import UUID
 from elm.cues.algebra import UidCue
 from elm.event import StoredEvent
 from elm.interval import Window
+from elm.query import Query
 from elm.storage import recall_statements, schema
 from elm.storage.connections import Connection, Connections
 from elm.storage.cue_compiler import compile_cue
 from elm.storage.names import NameCache
 from elm.storage.rows import FRAME_ID, SUBJECT_FRAME_ID, TYPE_ID, decoders
-from elm.store import Query
 
 
 class Session:

@@ -13,8 +13,8 @@ from elm import cues
 from elm.cues.algebra import Cue
 from elm.geometry import Region
 from elm.interval import Interval, from_micros
+from elm.query import Nearest
 from elm.recollector import Recollection
-from elm.store import Nearest
 from simulators.opponents.protocol import Question
 
 POINT = 1e-7

@@ -12,7 +12,8 @@ from time import perf_counter
 from typing import Any
 
 import elm
-from elm.cues.algebra import Cue, TypeCue, TypeRelation
+from elm.cues.algebra import Cue, TypeCue
+from elm.cues.relations import TypeRelation
 from elm.errors import StoreFailure, UnknownEvent
 from elm.event import StoredEvent
 from simulators.bench.scratch import Connection

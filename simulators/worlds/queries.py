@@ -7,22 +7,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from uuid import UUID
 
-from elm.cues.algebra import (
-    And,
-    Cue,
-    FeatureNamesCue,
-    FeaturesCue,
-    Kin,
-    KinCue,
-    PayloadCue,
-    Place,
-    RegionCue,
-    SetRelation,
-    TimeAxis,
-    TimeCue,
-    TypeCue,
-    TypeRelation,
-)
+from elm.cues.algebra import And, Cue, FeatureNamesCue, FeaturesCue, KinCue, PayloadCue, RegionCue, TimeCue, TypeCue
+from elm.cues.relations import Kin, Place, SetRelation, TimeAxis, TypeRelation
 from elm.errors import InvalidValue
 from elm.event import StoredEvent
 from elm.geometry import SpatialRelation

@@ -9,7 +9,8 @@ from hypothesis import Phase, settings
 from elm.cues.algebra import And, Cue
 from elm.errors import ElmError, StoreFailure
 from elm.event import Event, StoredEvent
-from elm.store import Arrival, Order, Query, Store
+from elm.query import Order, Query
+from elm.store import Arrival, Store
 from elm.taxonomy import EventType
 from tests.clock import at
 from tests.model import Model, same_events

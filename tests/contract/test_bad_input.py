@@ -13,13 +13,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from elm import cues
-from elm.cues.algebra import DEPTH_LIMIT, Cue, Place
+from elm.cues.algebra import DEPTH_LIMIT, Cue
+from elm.cues.relations import Place
 from elm.errors import ElmError, StoreClosed, UnknownEvent
 from elm.event import Event, Payload
 from elm.geometry import LIMIT, Region
 from elm.interval import Interval
+from elm.query import ByFeature, Cursor, Grouping, Join, JoinRelation, Nearest, Order, Query
 from elm.recollector import Recollector
-from elm.store import Arrival, ByFeature, Cursor, Grouping, Join, JoinRelation, Nearest, Order, Query, Store
+from elm.store import Arrival, Store
 from elm.taxonomy import EventType
 from tests.clock import at, span
 from tests.contract.telling import everything, found, is_clear, story, tell

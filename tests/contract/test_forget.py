@@ -12,14 +12,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from elm import cues
-from elm.cues.algebra import Cue, Kin
+from elm.cues.algebra import Cue
 from elm.cues.match import match
+from elm.cues.relations import Kin
 from elm.errors import ForgottenEvent, InvalidValue, UnknownEvent
 from elm.event import Event, Payload, StoredEvent
 from elm.forgetting import ForgettingReport, forget
 from elm.geometry import Region
 from elm.log import LoggedStore, LogKind
-from elm.store import Arrival, Order, Query, Store
+from elm.query import Order, Query
+from elm.store import Arrival, Store
 from elm.subscription import subscribe
 from elm.taxonomy import EventType
 from elm.tombstone import Forgotten, RunTombstone, Tombstone

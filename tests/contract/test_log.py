@@ -28,7 +28,8 @@ from elm.errors import (
 )
 from elm.event import Event, StoredEvent
 from elm.log import Log, LogEntry, LogKind, Step, Tick
-from elm.store import Arrival, Query
+from elm.query import Query
+from elm.store import Arrival
 from elm.taxonomy import EventType
 from tests.clock import at, span
 from tests.conftest import StoreFactory

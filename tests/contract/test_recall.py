@@ -14,23 +14,14 @@ from hypothesis import strategies as st
 from shapely import Polygon
 
 from elm import cues
-from elm.cues.algebra import Cue, Place
+from elm.cues.algebra import Cue
+from elm.cues.relations import Place
 from elm.errors import InvalidValue, UnknownEvent, UnknownType
 from elm.event import Event, Payload, StoredEvent
 from elm.geometry import Region
+from elm.query import ByFeature, Cursor, Group, Grouping, Join, JoinRelation, Nearest, Order, Query
 from elm.recollector import Recollector
-from elm.store import (
-    ByFeature,
-    Cursor,
-    Group,
-    Grouping,
-    Join,
-    JoinRelation,
-    Nearest,
-    Order,
-    Query,
-    Store,
-)
+from elm.store import Store
 from tests.clock import at, span
 from tests.conftest import StoreFactory
 from tests.contract.telling import everything, few_memories, found, holds, story, tell

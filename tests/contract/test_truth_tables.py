@@ -7,7 +7,8 @@ from uuid import UUID, uuid5
 
 import pytest
 
-from elm.store import Query, Store
+from elm.query import Query
+from elm.store import Store
 from tests.truth_tables import TABLES, Table
 
 

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from elm import cues
 from elm.errors import CycleRefused, UnknownType
 from elm.event import Event
-from elm.store import Arrival, Query, Store, TypesAdded
+from elm.query import Query
+from elm.store import Arrival, Store, TypesAdded
 from elm.taxonomy import EventType, Taxonomy
 from tests.clock import span
 from tests.conftest import StoreFactory

@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from elm.cues.algebra import Comparison, SetRelation, TypeRelation
 from elm.cues.codec import cue_from_json, cue_to_json
+from elm.cues.relations import Comparison, SetRelation, TypeRelation
 from elm.exchange import (
     event_from_json,
     event_to_json,
@@ -21,7 +21,7 @@ from elm.exchange import (
 )
 from elm.geometry import SpatialRelation
 from elm.interval import AllenRelation, parse_time
-from elm.store import Cursor
+from elm.query import Cursor
 from tests.pages import Page
 
 PAGE = Page("docs/formats.md")

@@ -14,8 +14,9 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
-from elm.cues.algebra import Cue, Kin
+from elm.cues.algebra import Cue
 from elm.cues.match import match
+from elm.cues.relations import Kin
 from elm.event import StoredEvent
 from elm.features import FeatureValue, as_features, kind_of
 from elm.geometry import Region

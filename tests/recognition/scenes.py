@@ -12,9 +12,9 @@ from elm import cues
 from elm.event import Event
 from elm.interval import Interval
 from elm.log import LoggedStore
+from elm.query import Query
 from elm.recognizers import Emission, Fed, Pattern, Recognizer, absent, same, step, sum_of, without
 from elm.recognizers.base import RECOGNIZER
-from elm.store import Query
 from elm.taxonomy import EventType
 from tests.clock import at
 

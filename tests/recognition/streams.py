@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
 from elm import cues
-from elm.cues.algebra import And, Comparison, Cue, Kin, Not, Or, Place, TypeCue, TypeRelation, node
+from elm.cues.algebra import And, Cue, Not, Or, TypeCue, node
 from elm.cues.match import match
+from elm.cues.relations import Comparison, Kin, Place, TypeRelation
 from elm.event import Event, StoredEvent
 from elm.features import FeatureValue
 from elm.geometry import Region

@@ -17,9 +17,10 @@ from elm.event import Event, StoredEvent
 from elm.forgetting import forget
 from elm.interval import Interval
 from elm.log import LoggedStore, LogKind, Tick
+from elm.query import Query
 from elm.recognition import RecognitionManager, Timing, replay
 from elm.recognizers import Pattern, step
-from elm.store import Arrival, Query
+from elm.store import Arrival
 from elm.taxonomy import EventType
 from tests.clock import at
 from tests.conftest import StoreFactory

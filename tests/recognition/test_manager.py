@@ -18,10 +18,11 @@ from elm.errors import ConsumerBusy, DefinitionChanged, InvalidValue, UnknownTyp
 from elm.event import Event, StoredEvent
 from elm.interval import Interval
 from elm.log import LoggedStore, LogKind, Tick
+from elm.query import Query
 from elm.recognition import RecognitionManager, Timing, replay
 from elm.recognition.bench import SELF_FEEDING
 from elm.recognizers import Emission, Fed, Pattern, Recognizer, absent, step
-from elm.store import Arrival, Query
+from elm.store import Arrival
 from elm.taxonomy import EventType
 from tests.clock import at
 from tests.recognition.scenes import Stateless

@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 
 from elm import cues
-from elm.cues.algebra import Place
+from elm.cues.relations import Place
 from elm.event import StoredEvent
 from elm.features import FeatureValue
 from elm.geometry import Region

@@ -19,12 +19,12 @@ from elm.errors import InvalidValue
 from elm.event import Event, StoredEvent
 from elm.interval import Interval
 from elm.log import LogKind
+from elm.query import Query
 from elm.recognition import RecognitionManager, Timing, replay
 from elm.recognition.bench import SELF_FEEDING
 from elm.recognizers import Emission, Fed, Pattern, Recognizer, Session, absent, step
 from elm.recognizers.elements import Element
 from elm.storage.memory import MemoryStore
-from elm.store import Query
 from elm.taxonomy import EventType
 from tests.clock import at
 from tests.recognition.scenes import Stateless

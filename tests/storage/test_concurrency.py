@@ -19,8 +19,9 @@ from psycopg import sql
 from elm import cues
 from elm.errors import ConflictingContent, CycleRefused, InvalidValue, UnknownEvent
 from elm.event import Event
+from elm.query import Order, Query
 from elm.storage.postgres import PostgresStore
-from elm.store import Arrival, Closed, Committed, Order, Query, Store
+from elm.store import Arrival, Closed, Committed, Store
 from elm.taxonomy import EventType
 from tests.clock import at, span
 from tests.servers import MEMORY

@@ -33,10 +33,11 @@ from elm.errors import (
     UnknownEvent,
 )
 from elm.event import Event
+from elm.query import Grouping, Query
 from elm.storage import diagnose, migrate
 from elm.storage.cluster import Cluster
 from elm.storage.postgres import PostgresStore
-from elm.store import Arrival, Grouping, Query
+from elm.store import Arrival
 from elm.taxonomy import EventType
 from tests.clock import at, span
 from tests.servers import MEMORY, Server

@@ -18,11 +18,12 @@ from elm import cues
 from elm.errors import DatabaseUnfit, ForgottenEvent, StoreFailure, UnknownEvent
 from elm.event import Event
 from elm.forgetting import forget
+from elm.query import Query
 from elm.storage import forgetting_statements, migrate
 from elm.storage import write_statements as statements
 from elm.storage.postgres import PostgresStore
 from elm.storage.tables import REVISION
-from elm.store import Arrival, Closed, Query, Store
+from elm.store import Arrival, Closed, Store
 from elm.taxonomy import EventType
 from elm.tombstone import Tombstone
 from tests.clock import at, span

@@ -16,8 +16,8 @@ import psycopg
 from elm import cues
 from elm.event import Event, StoredEvent
 from elm.forgetting import forget
+from elm.query import Query
 from elm.storage.postgres import PostgresStore
-from elm.store import Query
 from elm.taxonomy import EventType
 from tests.clock import span
 from tests.servers import MEMORY, run_private_cluster

@@ -17,18 +17,19 @@ from hypothesis import strategies as st
 from sqlalchemy import Select
 
 from elm import cues
-from elm.cues.algebra import Comparison, Cue, Kin, Place, SetRelation
+from elm.cues.algebra import Cue
 from elm.cues.match import match
+from elm.cues.relations import Comparison, Kin, Place, SetRelation
 from elm.errors import InvalidValue
 from elm.event import StoredEvent
 from elm.features import FeatureValue
 from elm.geometry import Region, SpatialRelation
 from elm.interval import AllenRelation
+from elm.query import ByFeature, Cursor, Grouping, Join, JoinRelation, Nearest, Order, Query
 from elm.storage import recall_statements
 from elm.storage.cue_compiler import compile_cue
 from elm.storage.hints import begins_within, is_pinned
 from elm.storage.postgres import PostgresStore
-from elm.store import ByFeature, Cursor, Grouping, Join, JoinRelation, Nearest, Order, Query
 from elm.taxonomy import EventType
 from tests.clock import at, span
 from tests.model import Model

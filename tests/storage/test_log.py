@@ -23,10 +23,11 @@ from elm.app import Memory
 from elm.errors import ConsumerBusy, DatabaseUnreachable, PositionLost
 from elm.event import Event
 from elm.log import LogEntry, LogKind, Step
+from elm.query import Query
 from elm.storage import postgres_log
 from elm.storage.encoding import COLUMNS
 from elm.storage.postgres import PostgresStore
-from elm.store import Arrival, Query
+from elm.store import Arrival
 from elm.taxonomy import EventType
 from tests.clock import at, span
 from tests.servers import MEMORY, Server

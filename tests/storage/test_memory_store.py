@@ -11,8 +11,9 @@ from uuid import UUID, uuid5
 import pytest
 
 from elm import cues
-from elm.cues.algebra import Cue, Kin, Place, SetRelation
+from elm.cues.algebra import Cue
 from elm.cues.match import match
+from elm.cues.relations import Kin, Place, SetRelation
 from elm.errors import (
     ConflictingContent,
     CycleRefused,
@@ -25,19 +26,9 @@ from elm.errors import (
 from elm.event import Event, Payload, StoredEvent
 from elm.geometry import Region, SpatialRelation
 from elm.interval import Interval
+from elm.query import ByFeature, Cursor, Grouping, Join, JoinRelation, Nearest, Order, Query
 from elm.storage.memory import MemoryStore
-from elm.store import (
-    Arrival,
-    ByFeature,
-    Cursor,
-    Grouping,
-    Join,
-    JoinRelation,
-    Nearest,
-    Order,
-    Query,
-    Store,
-)
+from elm.store import Arrival, Store
 from elm.taxonomy import EventType
 
 START = datetime(2026, 1, 1, 10, tzinfo=UTC)

@@ -29,10 +29,11 @@ from elm import cues
 from elm.errors import InvalidValue, MemoryMissing, SchemaMismatch
 from elm.event import Event
 from elm.log import LogKind
+from elm.query import Query
 from elm.storage import migrate
 from elm.storage.postgres import PostgresStore
 from elm.storage.tables import REVISION, metadata
-from elm.store import Arrival, Query
+from elm.store import Arrival
 from elm.taxonomy import EventType
 from tests.clock import at, span
 from tests.servers import MEMORY, Server

@@ -9,12 +9,12 @@ import pytest
 
 import elm
 from elm import cues
-from elm.cues.algebra import SetRelation
+from elm.cues.relations import SetRelation
 from elm.event import Event
 from elm.interval import Interval
+from elm.query import Query
 from elm.storage import recall_statements
 from elm.storage.postgres import PostgresStore
-from elm.store import Query
 from tests.clock import at
 from tests.servers import MEMORY
 

@@ -13,13 +13,15 @@ import pytest
 
 from elm import cues
 from elm.app import Memory
-from elm.cues.algebra import Cue, Place, SetRelation
+from elm.cues.algebra import Cue
+from elm.cues.relations import Place, SetRelation
 from elm.event import Event, StoredEvent
 from elm.geometry import Region
 from elm.interval import Interval
+from elm.query import Cursor, Nearest, Order, Query
 from elm.storage import recall_statements
 from elm.storage.postgres import PostgresStore
-from elm.store import Arrival, Cursor, Nearest, Order, Query
+from elm.store import Arrival
 from simulators.worlds import hierarchy
 from simulators.worlds.events import World, simulate
 from tests.servers import MEMORY, Server

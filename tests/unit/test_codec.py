@@ -12,8 +12,9 @@ from hypothesis import given
 from shapely.geometry import Polygon
 
 from elm import cues
-from elm.cues.algebra import DEPTH_LIMIT, And, Comparison, Cue, Not, Or, SetRelation
+from elm.cues.algebra import DEPTH_LIMIT, And, Cue, Not, Or
 from elm.cues.codec import cue_from_json, cue_to_json
+from elm.cues.relations import Comparison, SetRelation
 from elm.errors import InvalidValue
 from elm.exchange import parse_json, to_line
 from elm.geometry import Region, SpatialRelation

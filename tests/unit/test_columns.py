@@ -15,9 +15,10 @@ from elm.errors import MissingPackage
 from elm.event import Event, Payload
 from elm.geometry import Region
 from elm.interval import Interval
+from elm.query import Query
 from elm.recollector import Recollector
 from elm.storage.memory import MemoryStore
-from elm.store import Arrival, Query
+from elm.store import Arrival
 from elm.taxonomy import EventType
 
 BEGIN = datetime(2026, 1, 1, 10, 0, 0, 123456, tzinfo=UTC)

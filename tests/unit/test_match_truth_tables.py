@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 
 from elm import cues
-from elm.cues.algebra import Comparison, Kin, SetRelation, TypeRelation
 from elm.cues.match import match
+from elm.cues.relations import Comparison, Kin, SetRelation, TypeRelation
 from elm.geometry import SpatialRelation
 from elm.interval import AllenRelation
 from tests.model import Model, ids_of

@@ -22,8 +22,9 @@ from elm.event import Event, StoredEvent
 from elm.features import kind_of
 from elm.geometry import Region
 from elm.interval import Interval
+from elm.query import Order, Query
 from elm.storage.memory import MemoryStore
-from elm.store import Arrival, Order, Query
+from elm.store import Arrival
 from elm.taxonomy import EventType, Taxonomy
 from simulators import __main__ as command_line
 from simulators.worlds import hierarchy, vocabulary

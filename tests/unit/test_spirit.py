@@ -21,8 +21,8 @@ from elm.demo import rover_recognizers, spirit
 from elm.errors import InvalidValue
 from elm.event import Event, StoredEvent
 from elm.geometry import Region
+from elm.query import ByFeature, Nearest
 from elm.storage.memory import MemoryStore
-from elm.store import ByFeature, Nearest
 
 Line = dict[str, str]
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from sqlalchemy import ColumnElement
 
-from elm.cues.algebra import Comparison
+from elm.cues.relations import Comparison
 from elm.storage.conditions.rule import Bind, Condition
 
 COMPARE: Mapping[Comparison, Callable[[ColumnElement[Any], Bind], Condition]] = MappingProxyType(

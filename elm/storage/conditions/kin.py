@@ -22,7 +22,8 @@ from sqlalchemy import (
     union_all,
 )
 
-from elm.cues.algebra import Kin, KinCue, SetRelation
+from elm.cues.algebra import KinCue
+from elm.cues.relations import Kin, SetRelation
 from elm.storage.conditions.rule import UIDS, Bind, Condition, Rule
 from elm.storage.tables import event, part, tombstone
 

@@ -30,7 +30,8 @@ from sqlalchemy import (
 from sqlalchemy.dialects.postgresql import array
 from sqlalchemy.types import TypeEngine
 
-from elm.cues.algebra import Comparison, FeatureCue, FeatureNamesCue, FeaturesCue, SetRelation
+from elm.cues.algebra import FeatureCue, FeatureNamesCue, FeaturesCue
+from elm.cues.relations import Comparison, SetRelation
 from elm.features import ends_within, fold, kind_of, name_tokens, token, tokens, value_text
 from elm.storage.conditions.compare import COMPARE
 from elm.storage.conditions.rule import TEXTS, Bind, Condition, Rule, indexed

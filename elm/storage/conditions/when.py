@@ -10,7 +10,8 @@ from sqlalchemy import ColumnElement, FromClause, Interval, and_, false, func, l
 from sqlalchemy.dialects.postgresql import TSTZRANGE
 from sqlalchemy.types import TypeEngine
 
-from elm.cues.algebra import DurationCue, SetRelation, TimeAxis, TimeCue
+from elm.cues.algebra import DurationCue, TimeCue
+from elm.cues.relations import SetRelation, TimeAxis
 from elm.interval import AllenRelation
 from elm.storage.conditions.compare import COMPARE
 from elm.storage.conditions.rule import TIME, Bind, Condition, Rule, indexed

@@ -8,7 +8,8 @@ from geoalchemy2 import Geometry
 from sqlalchemy import ColumnElement, Double, FromClause, Integer, LargeBinary, and_, func
 from sqlalchemy.types import TypeEngine
 
-from elm.cues.algebra import Place, RegionCue
+from elm.cues.algebra import RegionCue
+from elm.cues.relations import Place
 from elm.geometry import SpatialRelation
 from elm.storage.conditions.rule import Bind, Condition, Names, Rule
 

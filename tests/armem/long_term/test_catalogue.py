@@ -14,8 +14,8 @@ from elm.app import Memory
 from elm.cues.algebra import Cue
 from elm.event import Event
 from elm.interval import Interval
+from elm.query import ByFeature, Group, Grouping
 from elm.storage.memory import MemoryStore
-from elm.store import ByFeature, Group, Grouping
 from tests.armem.long_term.memories import QUICK, behind
 from tests.armem.working.scenes import CUP, commit, snapshot, update
 from tests.conftest import StoreFactory
