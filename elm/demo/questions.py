@@ -71,10 +71,6 @@ def _contacts_at_stands(memory: Memory) -> Cue:
     return cues.exactly("BeaconContact") & overlaps
 
 
-def _contacts_of_plaza1(memory: Memory) -> Cue:
-    return cues.exactly("BeaconContact") & cues.wholes("intersects", [session_of(memory, "plaza1").uid])
-
-
 def _after_longest_stand(memory: Memory) -> Cue:
     return cues.is_a("Motion") & cues.time("met_by", max(_stands(memory), key=duration).interval)
 

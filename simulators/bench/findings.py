@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,6 +9,8 @@ from typing import Any
 
 from rich.console import Console
 from rich.table import Table
+
+from simulators.bench.files import write_json
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,9 +51,8 @@ class Report:
         return {**self.figures, "goals": goals, "run": dict(run)}
 
     def write(self, file: Path, run: Mapping[str, Any]) -> None:
-        """Write the report as JSON; missing directories are made."""
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text(json.dumps(self.as_json(run), indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+        """Write the report as JSON, whole or not at all; missing directories are made."""
+        write_json(file, self.as_json(run), indent=2)
 
     def show(self, title: str, console: Console) -> None:
         """Print the tables, the goals last where there are some."""

@@ -1,4 +1,4 @@
-"""Pieces of Markdown that all sections of the report are made of: tables and numbers."""
+"""Pieces of text that all sections of the report are made of, and the labels of its plots: tables and numbers."""
 
 from __future__ import annotations
 

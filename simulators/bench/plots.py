@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from elm.errors import MissingPackage
+from simulators.bench import markdown
 
 try:
     import matplotlib
@@ -29,7 +30,9 @@ INK, MUTED, RULE, PAPER = "#22303c", "#6b7885", "#e3e6ea", "#ffffff"
 LIMIT = "#8a8f95"
 """The colour of what the machine itself costs: the bare insert, the bare COPY, the bare fetch."""
 
-_MARKERS = "osD^vPX*h"
+MARKERS = "osD^vPX*h"
+"""Markers in the order in which series get them."""
+
 _SIZE = (8.0, 4.8)
 _DPI = 140
 _STYLE: dict[Any, Any] = {
@@ -76,7 +79,7 @@ def line(
     spread: Sequence[float] | None = None,
 ) -> None:
     """A series with the colour and the marker of its number; `spread` is drawn as error bars, cut off at zero."""
-    marker = _MARKERS[number % len(_MARKERS)]
+    marker = MARKERS[number % len(MARKERS)]
     look: dict[str, Any] = {"color": colour(number), "marker": marker, "markersize": 4.0, "linewidth": 1.6}
     if spread is None:
         axes.plot(xs, ys, label=label, **look)
@@ -130,7 +133,7 @@ def bars(
         axes.barh(places, widths, height=thick * 0.92, left=left, color=shades)
         axes.plot([], [], marker="s", markersize=9, linestyle="", color=shade, label=label)
         for place, value in zip(places, values, strict=True):
-            text = missing if value is None else short(value)
+            text = missing if value is None else markdown.number(value)
             axes.annotate(
                 text,
                 (left if value is None else value, place),
@@ -149,15 +152,6 @@ def bars(
     largest = max([*known, goal or 0.0], default=1.0)
     axes.set_xlim(left, largest * (largest / left) ** 0.12 if log else (largest or 1.0) * 1.12)
     return drawn
-
-
-def short(value: float) -> str:
-    """A number in about three digits, without an exponent: 0.0123, 4.5, 12,300."""
-    if value == 0:
-        return "0"
-    if abs(value) >= 100:
-        return f"{value:,.0f}"
-    return f"{value:.3g}"
 
 
 def write(drawn: Figure, directory: Path, name: str) -> Path:

@@ -15,7 +15,6 @@ from simulators.opponents.compared import CANNOT, cell, complaints, in_digits, o
 from simulators.opponents.protocol import FILTERED, MODES, NATIVE
 from simulators.opponents.runner import LIMIT
 
-_MARKS = "osD^vPX*h"
 _DASHES = ((0, (5, 3)), (0, (1, 2)))
 _FEW = 6
 """Kinds of questions that a sentence names; of more it says how many."""
@@ -168,7 +167,11 @@ def _ratios(figures: Mapping[str, Any], pictures: Path) -> Path:
     for index, name in enumerate((*opponents(figures), LIMIT)):
         cells = ((row, figures["classes"][kind][name].get("ratio")) for row, kind in enumerate(kinds))
         known = [(ratio, row) for row, ratio in cells if ratio is not None]
-        look: dict[str, Any] = {"marker": _MARKS[index % len(_MARKS)], "color": plots.colour(index), "markersize": 5.5}
+        look: dict[str, Any] = {
+            "marker": plots.MARKERS[index % len(plots.MARKERS)],
+            "color": plots.colour(index),
+            "markersize": 5.5,
+        }
         if name == LIMIT:
             look = {"marker": "|", "color": plots.LIMIT, "markersize": 11.0, "markeredgewidth": 2.5}
         xs, ys = [ratio for ratio, _ in known], [row for _, row in known]

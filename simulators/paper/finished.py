@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from simulators.bench.files import write_json
 from simulators.paper.schedule import Answer, Course
 from simulators.paper.times import Times
 
@@ -55,11 +56,7 @@ def keep(directory: Path | None, finished: Finished, under: Mapping[str, Any]) -
         "load_average": dict(finished.load_average),
         "times": finished.times.as_json(),
     }
-    directory.mkdir(parents=True, exist_ok=True)
-    file = _file(directory, finished.course, under)
-    unfinished = file.with_suffix(".unfinished")
-    unfinished.write_text(json.dumps(written, ensure_ascii=False) + "\n", encoding="utf-8")
-    unfinished.replace(file)
+    write_json(_file(directory, finished.course, under), written)
 
 
 def find(directory: Path | None, course: Course, under: Mapping[str, Any]) -> Finished | None:

@@ -9,9 +9,7 @@ from typing import Any
 
 from simulators.bench import plots
 from simulators.bench.markdown import number, table
-
-GOAL = 1.5
-"""Growth of a recall from 10^5 to 10^6 events that is wanted at most."""
+from simulators.scaling import growth
 
 _EVENTS = "events in the memory"
 _PANELS = (
@@ -44,17 +42,17 @@ def _paragraphs(figures: Mapping[str, Any], pictures: Path) -> Iterator[str]:
     )
     yield "### Commits\n\n"
     yield (
-        f"Mean time of one call with its commit, in ms; growth between {_pair(figures['insert_between'])} events. The "
-        "limit line is the insert of a bare row into a table of as many rows.\n\n"
+        f"Mean time of one call with its commit, in ms; growth between {growth.pair(figures['insert_between'])} "
+        "events. The limit line is the insert of a bare row into a table of as many rows.\n\n"
     )
     yield table(("", *_heads(sizes), "growth", "growth of medians"), _commit_rows(figures, sizes))
     yield plots.picture(_commits(figures, pictures), "Mean time of a commit by the size of the memory") + "\n\n"
     yield "### Recalls\n\n"
     yield (
         f"Median time of `list(memory.recall(cue, limit={figures['limit']}))`, in ms, and the mean number of rows. "
-        f"Growth between {_pair(figures['recall_between'])} events is that of answers with as many rows: where the "
-        f"larger memory has more, both were asked again with the limit given. `first` is the growth of the first time "
-        f"that a cue was asked, `fetch` that of fetching the same rows by their ids.\n\n"
+        f"Growth between {growth.pair(figures['recall_between'])} events is that of answers with as many rows: where "
+        f"the larger memory has more, both were asked again with the limit given. `first` is the growth of the first "
+        f"time that a cue was asked, `fetch` that of fetching the same rows by their ids.\n\n"
     )
     head = ("", *_heads(sizes), *(f"rows, {size}" for size in _heads(sizes)), "limit", "growth", "first", "fetch")
     yield table(head, _recall_rows(figures["classes"], sizes))
@@ -75,10 +73,6 @@ def _paragraphs(figures: Mapping[str, Any], pictures: Path) -> Iterator[str]:
 
 def _heads(sizes: Iterable[str]) -> list[str]:
     return [f"{int(size):,}" for size in sizes]
-
-
-def _pair(between: Sequence[int]) -> str:
-    return " and ".join(f"{size:,}" for size in between)
 
 
 def _memory(found: Mapping[str, Any]) -> list[str]:
@@ -145,11 +139,11 @@ def _growth(figures: Mapping[str, Any], pictures: Path) -> Path:
             "growth of the recall": [found["growth"] for found in asked.values()],
             fetch: [found["bare_growth"] for found in asked.values()],
         },
-        f"Growth between {_pair(figures['recall_between'])} events",
+        f"Growth between {growth.pair(figures['recall_between'])} events",
         "times as long",
         log=True,
         limit_label=fetch,
-        goal=GOAL,
+        goal=growth.RECALL_GOAL,
     )
     return plots.write(drawn, pictures, "scale_growth")
 

@@ -12,6 +12,9 @@ INSERT_SIZES = (10_000, 1_000_000)
 RECALL_SIZES = (100_000, 1_000_000)
 """Events in the two memories between which recalls are compared."""
 
+INSERT_GOAL, RECALL_GOAL = 1.2, 1.5
+"""How many times as long a commit or a recall may take in the larger of the two."""
+
 Series = Mapping[int, Sequence[float]]
 """Seconds of single calls, by the number of events in the memory."""
 
@@ -31,6 +34,11 @@ def compared(sizes: Sequence[int], wanted: tuple[int, int]) -> tuple[int, int]:
     if set(wanted) <= set(sizes):
         return wanted
     return (sizes[0], sizes[-1]) if wanted == INSERT_SIZES else (sizes[-2], sizes[-1])
+
+
+def pair(between: Sequence[int]) -> str:
+    """The two sizes in words."""
+    return " and ".join(f"{size:,}" for size in between)
 
 
 def of_medians(series: Series, between: tuple[int, int]) -> float:

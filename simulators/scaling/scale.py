@@ -22,8 +22,6 @@ LARGEST, QUICK_LARGEST = 1_000_000, 10_000
 CUES, QUICK_CUES = 30, 5
 GROUPS, QUICK_GROUPS = 200, 10
 
-_INSERT_GOAL, _RECALL_GOAL = 1.2, 1.5
-
 
 def main(argv: list[str]) -> int:
     """The command `scale`; its exit code."""
@@ -113,8 +111,8 @@ def _goals(figures: Mapping[str, Any]) -> list[Goal]:
     growing = {f"classes.{name}": found for name, found in figures["classes"].items()}
     growing |= {f"subtypes.{depth}": found for depth, found in figures["subtypes"].items()}
     return [
-        Goal(name="insert_growth", value=figures["insert_growth"], at_most=_INSERT_GOAL),
-        *(Goal(name=name, value=found["growth"], at_most=_RECALL_GOAL) for name, found in growing.items()),
+        Goal(name="insert_growth", value=figures["insert_growth"], at_most=growth.INSERT_GOAL),
+        *(Goal(name=name, value=found["growth"], at_most=growth.RECALL_GOAL) for name, found in growing.items()),
     ]
 
 
@@ -145,10 +143,6 @@ def _tables(figures: Mapping[str, Any]) -> dict[str, Table]:
         recalls.add_row(name, *times, *rows, str(found["limit"]), *growths)
     return {
         "memories": loads,
-        f"commits between {_pair(figures['insert_between'])} events": commits,
+        f"commits between {growth.pair(figures['insert_between'])} events": commits,
         f"recalls of up to {figures['limit']} events, growth between equally many": recalls,
     }
-
-
-def _pair(between: Sequence[int]) -> str:
-    return " and ".join(f"{size:,}" for size in between)

@@ -7,6 +7,8 @@ from datetime import UTC, datetime, timedelta
 from hashlib import md5
 from typing import Any
 
+from simulators.opponents.sides.spelling import token
+
 Item = dict[str, Any]
 """A JSON object: an item, or an expression."""
 
@@ -45,13 +47,7 @@ def when(relation: str, asked: Any) -> Item:
 
 def tokens(features: Sequence[Sequence[Any]]) -> list[str]:
     """Features as a sorted set of texts; numbers are equal by value, and no number is a bool."""
-    return sorted({_token(name, value) for name, value in features})
-
-
-def _token(name: str, value: Any) -> str:
-    if isinstance(value, float) and value.is_integer():
-        value = int(value)
-    return f"{name}={type(value).__name__ if isinstance(value, str | bool) else 'number'}:{value!r}"
+    return sorted({token(name, value) for name, value in features})
 
 
 def digest(payload: bytes) -> str:

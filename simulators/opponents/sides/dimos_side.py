@@ -26,9 +26,10 @@ from typing import Any
 import pysqlite3
 import shapely
 
-from simulators.opponents.protocol import KINDS, FeatureValue, Question, Record, Workload, everything_but, serve
+from simulators.opponents.protocol import KINDS, Question, Record, Workload, everything_but, serve
 from simulators.opponents.sides.exact import Facts, fitting, related
 from simulators.opponents.sides.points import Extents, Search, search_of
+from simulators.opponents.sides.spelling import token
 
 _NATIVE = ("type.exactly", "type.latest")
 _FIRST_RADIUS = 2.0
@@ -109,7 +110,7 @@ class DimosSide:
             case "nearest":
                 return self._nearest(question)
             case "features":
-                return self._with(question, relation, [_token(name, given) for name, given in value])
+                return self._with(question, relation, [token(name, given) for name, given in value])
             case "feature_names":
                 return self._with(question, relation, value)
             case _:
@@ -127,7 +128,7 @@ class DimosSide:
     def _tags(self, record: Record) -> dict[str, str]:
         several = {
             "kind": self._kinds[record.type],
-            "features": sorted({_token(name, value) for name, value in record.features}),
+            "features": sorted({token(name, value) for name, value in record.features}),
             "feature_names": sorted({name for name, _ in record.features}),
         }
         tags = {"uid": record.uid, "type": record.type, "payload": _digest(record.payload)}
@@ -254,13 +255,7 @@ def _distance(row: Any, x: float, y: float) -> float:
 
 
 def _several(field: str, data: Facts) -> Iterator[str]:
-    return (_token(name, value) if field == "features" else name for name, value in data["features"])
-
-
-def _token(name: str, value: FeatureValue) -> str:
-    """A feature as text that is equal when name and value are: 1 and 1.0 are, 1 and True are not."""
-    canonical = int(value) if isinstance(value, float) and value.is_integer() else value
-    return f"{name}={canonical!r}"
+    return (token(name, value) if field == "features" else name for name, value in data["features"])
 
 
 def _digest_of(texts: Iterable[str]) -> str:

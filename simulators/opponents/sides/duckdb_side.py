@@ -14,7 +14,6 @@ import json
 from collections.abc import Mapping, Sequence
 from operator import itemgetter
 from pathlib import Path
-from struct import pack
 from types import MappingProxyType
 from typing import Any
 
@@ -22,7 +21,8 @@ import duckdb
 import duckdb_extension_spatial
 import pyarrow as pa
 
-from simulators.opponents.protocol import FeatureValue, Question, Record, Workload, everything_but, serve
+from simulators.opponents.protocol import Question, Record, Workload, everything_but, serve
+from simulators.opponents.sides.spelling import polygon, token
 
 _TABLES = """
 CREATE TABLE event (
@@ -237,7 +237,7 @@ def _condition(question: Question) -> tuple[str, dict[str, Any]]:
     if field == "wholes":
         return (_CONDITIONS[kind], {"set": value}) if value else (_NO_WHOLES[kind], {})
     if field == "region":
-        return _CONDITIONS[kind], {"polygon": _wkb(value)}
+        return _CONDITIONS[kind], {"polygon": polygon(value)}
     if field == "payload":
         return _CONDITIONS[kind], {"payload": bytes.fromhex(value)}
     if field == "type":
@@ -248,7 +248,7 @@ def _condition(question: Question) -> tuple[str, dict[str, Any]]:
 def _set_condition(field: str, relation: str, value: Sequence[Any]) -> tuple[str, dict[str, Any]]:
     """The relation of a list column, which has no repetitions, to a set."""
     column, kind = _SETS[field]
-    tokens = [_token(name, given) for name, given in value] if field == "features" else value
+    tokens = [token(name, given) for name, given in value] if field == "features" else value
     given = f"$set::{kind}"
     relations = {
         "equal": _EQUAL[field],
@@ -266,26 +266,15 @@ def _row(record: Record) -> dict[str, Any]:
         "type": record.type,
         "begin_time": record.begin,
         "end_time": record.end,
-        "region": None if record.ring is None else _wkb(record.ring),
+        "region": None if record.ring is None else polygon(record.ring),
         "features": json.dumps(record.features),
-        "tokens": sorted({_token(name, value) for name, value in record.features}),
+        "tokens": sorted({token(name, value) for name, value in record.features}),
         "names": sorted({name for name, _ in record.features}),
         "agent": record.agent,
         "payload": record.payload,
         "media_type": record.media_type,
         "parts": list(record.parts),
     }
-
-
-def _token(name: str, value: FeatureValue) -> str:
-    """A feature as text that is equal when name and value are: 1 and 1.0 are, 1 and True are not."""
-    canonical = int(value) if isinstance(value, float) and value.is_integer() else value
-    return json.dumps([name, canonical])
-
-
-def _wkb(ring: Sequence[Sequence[float]]) -> bytes:
-    """A polygon without holes as well-known binary."""
-    return pack(f"<BIII{2 * len(ring)}d", 1, 3, 1, len(ring), *(number for corner in ring for number in corner))
 
 
 if __name__ == "__main__":

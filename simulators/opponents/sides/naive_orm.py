@@ -24,6 +24,7 @@ from sqlalchemy.orm import Session, joinedload, selectinload
 
 from simulators.opponents.protocol import Question, Record, Workload, everything_but, serve
 from simulators.opponents.sides.naive_tables import Agent, Base, Event, Feature, Part, Payload, Place, Type, TypeParent
+from simulators.opponents.sides.spelling import canonical
 
 _BATCH = 1_000
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
@@ -266,7 +267,7 @@ def _time(micros: int) -> datetime:
 
 def _text(value: Any) -> str:
     """A value as JSON; numbers are equal by value."""
-    return json.dumps(int(value) if isinstance(value, float) and value.is_integer() else value, ensure_ascii=False)
+    return json.dumps(canonical(value), ensure_ascii=False)
 
 
 if __name__ == "__main__":

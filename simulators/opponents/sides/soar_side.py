@@ -25,8 +25,9 @@ from typing import Any
 import shapely
 import soar_sml
 
-from simulators.opponents.protocol import KINDS, FeatureValue, Question, Record, Workload, everything_but, serve
+from simulators.opponents.protocol import KINDS, Question, Record, Workload, everything_but, serve
 from simulators.opponents.sides.exact import Facts, fitting
+from simulators.opponents.sides.spelling import token
 
 Cue = Mapping[str, Sequence[str | int]]
 """Symbols by attribute, all of which an event is to have."""
@@ -146,7 +147,7 @@ class SoarSide:
             case "parts":
                 return self._with(question, "part", relation, value)
             case "features":
-                return self._with(question, "feature", relation, [_token(*feature) for feature in value])
+                return self._with(question, "feature", relation, [token(*feature) for feature in value])
             case "feature_names":
                 return self._with(question, "name", relation, value)
             case "wholes":
@@ -182,7 +183,7 @@ class SoarSide:
         self._names |= names
         several = {
             "kind": self._kinds[record.type],
-            "feature": {_token(name, value) for name, value in record.features},
+            "feature": {token(name, value) for name, value in record.features},
             "name": names,
             "part": set(record.parts),
         }
@@ -288,12 +289,6 @@ def _facts(found: Any) -> Facts:
         "payload": b64decode(told["payload"]),
         "region": None if told["region"] == "none" else told["region"],
     }
-
-
-def _token(name: str, value: FeatureValue) -> str:
-    """A feature as one symbol: 1 and 1.0 are the same, 1 and True are not."""
-    canonical = int(value) if isinstance(value, float) and value.is_integer() else value
-    return json.dumps([name, canonical])
 
 
 if __name__ == "__main__":

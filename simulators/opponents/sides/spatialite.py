@@ -8,17 +8,17 @@ SpatiaLite with its spatial index, whose R*Tree finds the boxes and whose GEOS f
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
-from struct import pack
 from types import MappingProxyType
 from typing import Any
 
 import apsw
 
-from simulators.opponents.protocol import Question, Record, Ring, Workload, everything_but, serve
-from simulators.opponents.sides.sqlite_file import FIRST_RADIUS, ROUNDING, SqliteFile
-from simulators.opponents.sides.sqlite_tables import COLUMNS, Found, keep, order_of, row_of
+from simulators.opponents.protocol import Question, Record, Workload, everything_but, serve
+from simulators.opponents.sides.spelling import polygon
+from simulators.opponents.sides.sqlite_file import FIRST_RADIUS, ROUNDING, SqliteFile, square
+from simulators.opponents.sides.sqlite_tables import COLUMNS, IS_A, Found, keep, order_of, row_of
 
 _EXTENSION = "mod_spatialite"
 _PLACE = (
@@ -35,10 +35,6 @@ _AROUND = "b.xmin <= :west AND b.xmax >= :east AND b.ymin <= :south AND b.ymax >
 _NEAR = "ST_Distance(p.region, MakePoint(:x, :y)) <= :metres"
 _ASKED = "GeomFromWKB(:region, -1)"
 _LATELY = "e.begins <= :end AND e.ends >= :begin"
-_IS_A = (
-    "EXISTS (SELECT 1 FROM is_a i WHERE i.ancestor = (SELECT id FROM type WHERE name = :type)"
-    " AND i.descendant = e.type)"
-)
 _PLACES: Mapping[str, str] = MappingProxyType(
     {
         "region.equal": f"{_INDEX} WHERE {_AROUND} AND ST_Equals(p.region, {_ASKED}) = 1",
@@ -47,7 +43,7 @@ _PLACES: Mapping[str, str] = MappingProxyType(
         "region.intersects": f"{_INDEX} WHERE {_MEETING} AND ST_Intersects(p.region, {_ASKED}) = 1",
         "near": f"{_INDEX} WHERE {_MEETING} AND {_NEAR}",
         "near.lately": f"{_INDEX} WHERE {_MEETING} AND {_LATELY} AND {_NEAR}",
-        "near.type": f"{_INDEX} WHERE {_MEETING} AND {_IS_A} AND {_NEAR}",
+        "near.type": f"{_INDEX} WHERE {_MEETING} AND {IS_A} AND {_NEAR}",
     }
 )
 _NEAREST = (
@@ -84,7 +80,7 @@ class SpatiaLite(SqliteFile):
         if record.ring is None:
             keep(self._connection, row, ())
         else:
-            keep(self._connection, row | {"region": _wkb(record.ring)}, _INSERT_PLACE)
+            keep(self._connection, row | {"region": polygon(record.ring)}, _INSERT_PLACE)
 
     def _placed(self, question: Question, values: Mapping[str, Any]) -> list[Found]:
         return self._found(f"{_PLACES[question.kind]}{order_of(question)}", {**values, **_place(question)})
@@ -112,17 +108,11 @@ def _place(question: Question) -> dict[str, Any]:
     xs, ys = [x for x, _ in asked], [y for _, y in asked]
     wider = ROUNDING if question.kind == "region.subset" else 0.0
     box = {"west": min(xs) - wider, "south": min(ys) - wider, "east": max(xs) + wider, "north": max(ys) + wider}
-    return {**box, "region": _wkb(asked)}
+    return {**box, "region": polygon(asked)}
 
 
 def _around(x: float, y: float, metres: float) -> dict[str, float]:
-    box = {"west": x - metres, "east": x + metres, "south": y - metres, "north": y + metres}
-    return {**box, "x": x, "y": y, "metres": metres}
-
-
-def _wkb(ring: Ring | Sequence[Sequence[float]]) -> bytes:
-    """A polygon with this exterior ring as well-known binary, little-endian."""
-    return pack(f"<BIII{2 * len(ring)}d", 1, 3, 1, len(ring), *(number for corner in ring for number in corner))
+    return {**square(x, y, metres), "x": x, "y": y, "metres": metres}
 
 
 if __name__ == "__main__":

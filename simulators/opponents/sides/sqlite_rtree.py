@@ -22,7 +22,7 @@ import shapely
 
 from simulators.opponents.protocol import Question, Record, Workload, everything_but, serve
 from simulators.opponents.sides.sqlite_file import FIRST_RADIUS, ROUNDING, SqliteFile, square
-from simulators.opponents.sides.sqlite_tables import COLUMNS, Found, keep, row_of
+from simulators.opponents.sides.sqlite_tables import COLUMNS, IS_A, Found, keep, row_of
 
 _PLACE = (
     "CREATE VIRTUAL TABLE box USING rtree (number, west, east, south, north, begins, ends)",
@@ -38,10 +38,6 @@ _INSIDE = "b.west >= :west AND b.east <= :east AND b.south >= :south AND b.north
 _AROUND = "b.west <= :west AND b.east >= :east AND b.south <= :south AND b.north >= :north"
 _BOX = "box b CROSS JOIN event e ON e.number = b.number"
 _LATELY = "b.begins <= :end_s AND b.ends >= :begin_s AND e.begins <= :end AND e.ends >= :begin"
-_IS_A = (
-    "EXISTS (SELECT 1 FROM is_a i WHERE i.ancestor = (SELECT id FROM type WHERE name = :type)"
-    " AND i.descendant = e.type)"
-)
 _PLACES: Mapping[str, str] = MappingProxyType(
     {
         "region.equal": f"{_BOX} WHERE {_AROUND}",
@@ -50,7 +46,7 @@ _PLACES: Mapping[str, str] = MappingProxyType(
         "region.intersects": f"{_BOX} WHERE {_MEETING}",
         "near": f"{_BOX} WHERE {_MEETING}",
         "near.lately": f"{_BOX} WHERE {_MEETING} AND {_LATELY}",
-        "near.type": f"{_BOX} WHERE {_MEETING} AND {_IS_A}",
+        "near.type": f"{_BOX} WHERE {_MEETING} AND {IS_A}",
         "nearest": f"{_BOX} WHERE {_MEETING}",
     }
 )

@@ -7,10 +7,12 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from hashlib import blake2b
+from itertools import starmap
 from types import MappingProxyType
 from typing import Any, NamedTuple, Protocol
 
-from simulators.opponents.protocol import FeatureValue, Question, Record, Workload
+from simulators.opponents.protocol import Question, Record, Workload
+from simulators.opponents.sides.spelling import token
 
 SCHEMA = """
 CREATE TABLE type (id INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE);
@@ -131,6 +133,12 @@ SEARCHES: Mapping[str, str] = MappingProxyType(
 )
 """For each kind where its events are found; `CROSS JOIN` is SQLite's way to say which table comes first."""
 
+IS_A = (
+    "EXISTS (SELECT 1 FROM is_a i WHERE i.ancestor = (SELECT id FROM type WHERE name = :type)"
+    " AND i.descendant = e.type)"
+)
+"""Whether an event is of a type or of one below it."""
+
 COLUMNS = (
     "e.uid, (SELECT name FROM type WHERE id = e.type), e.begins, e.ends, e.features, e.agent, e.media_type, "
     "e.payload, e.parts"
@@ -218,7 +226,7 @@ def keep(connection: Connection, row: Mapping[str, Any], places: Sequence[str]) 
 
 def row_of(record: Record) -> dict[str, Any]:
     """An event as the statements take it."""
-    tokens = _canonical(map(token, record.features))
+    tokens = _canonical(starmap(token, record.features))
     names = _canonical(name for name, _ in record.features)
     return {
         "number": record.number,
@@ -254,7 +262,7 @@ def values_of(question: Question) -> dict[str, Any]:
             data = bytes.fromhex(asked)
             return found | {"payload": data, "digest": _digest(data)}
         case "features":
-            return found | _wanted(_canonical(token((name, value)) for name, value in asked))
+            return found | _wanted(_canonical(token(name, value) for name, value in asked))
         case "feature_names" | "parts" | "wholes":
             return found | _wanted(_canonical(asked))
         case "region":
@@ -273,14 +281,6 @@ def order_of(question: Question) -> str:
             return " ORDER BY e.begins DESC, e.number DESC LIMIT :limit"
         case _:
             return " ORDER BY e.begins, e.number LIMIT :limit"
-
-
-def token(feature: tuple[str, FeatureValue]) -> str:
-    """A feature as one text; numbers are equal by value, and no number is a bool."""
-    name, value = feature
-    if isinstance(value, float) and value.is_integer():
-        value = int(value)
-    return json.dumps([name, value], ensure_ascii=False)
 
 
 def _canonical(texts: Iterable[str]) -> list[str]:
