@@ -6,6 +6,7 @@ import struct
 from collections.abc import Iterable, Sequence
 from enum import StrEnum
 from itertools import chain, pairwise
+from numbers import Real
 from typing import Any, Self, cast
 
 import numpy as np
@@ -79,14 +80,23 @@ class Region:
 
     @classmethod
     def box(cls, xmin: float, ymin: float, xmax: float, ymax: float, *, frame: str = DEFAULT_FRAME) -> Self:
-        """The axis-parallel rectangle between two corners."""
+        """The axis-parallel rectangle between two opposite corners."""
+        _check_coordinates(xmin, ymin, xmax, ymax, what="the corners of a box")
+        if xmin == xmax or ymin == ymax:
+            raise InvalidValue(
+                f"a box from ({xmin}, {ymin}) to ({xmax}, {ymax}) has no area: widen it, by what the robot covers"
+            )
         return cls(polygon=box(xmin, ymin, xmax, ymax, ccw=True), frame=frame)
 
     @classmethod
     def around(cls, x: float, y: float, radius: float, *, frame: str = DEFAULT_FRAME) -> Self:
         """A regular 32-gon whose corners lie `radius` metres from (x, y): it lies inside the circle."""
+        _check_coordinates(x, y, what="the middle of a region")
         _check_metres(radius, what="the radius of a region")
-        return cls(polygon=Point(x, y).buffer(radius, quad_segs=8), frame=frame)
+        polygon = Point(x, y).buffer(radius, quad_segs=8)
+        if not polygon.area:
+            raise InvalidValue(f"{radius} m around ({x}, {y}) are finer than the digits of these numbers: widen it")
+        return cls(polygon=polygon, frame=frame)
 
     @classmethod
     def hull(cls, path: Iterable[Sequence[float]], *, footprint: float, frame: str = DEFAULT_FRAME) -> Self:
@@ -229,8 +239,13 @@ def _points(path: Iterable[Sequence[float]]) -> list[tuple[float, float]]:
     return points
 
 
+def _check_coordinates(*given: float, what: str) -> None:
+    if not all(isinstance(number, Real) and abs(number) <= LIMIT for number in given):
+        raise InvalidValue(f"{what} must be numbers of metres up to {LIMIT:g} either way, not {given!r:.200}")
+
+
 def _check_metres(value: float, *, what: str) -> None:
-    if not 0 < value <= LIMIT:
+    if not isinstance(value, Real) or not 0 < value <= LIMIT:
         raise InvalidValue(f"{what} must be greater than 0 and at most {LIMIT:g} metres, not {value!r}")
 
 

@@ -21,13 +21,19 @@ PLUS_INFINITY = 2**63 - 1
 def as_utc(moment: datetime, *, what: str) -> datetime:
     """`moment` in UTC; naive datetimes are refused, naming `what`, for nobody can know which instant they mean."""
     if not isinstance(moment, datetime):
-        raise InvalidValue(f"{what} must be a datetime, not {type(moment).__name__}: {moment!r}")
+        raise InvalidValue(
+            f"{what} must be a datetime, not {type(moment).__name__}: {moment!r:.80}. "
+            f"Make one of it, like datetime.fromtimestamp(seconds, UTC) or pandas.Timestamp(it, tz='UTC')"
+        )
     if type(moment) is datetime and moment.tzinfo is UTC:
         return moment
+    # pandas.NaT is a datetime, and the only one that is not equal to itself.
+    if moment != moment:
+        raise InvalidValue(f"{what} is {moment!r}, which is no time: leave out what has none")
     if moment.utcoffset() is None:
         raise InvalidValue(
             f"{what} is a naive datetime ({moment.isoformat()}): say which zone it is in, "
-            f"for example {moment.replace(tzinfo=UTC).isoformat()} with tzinfo=datetime.UTC"
+            f"as {moment.replace(tzinfo=UTC).isoformat()} does (in Python, tzinfo=datetime.UTC)"
         )
     # A plain datetime: a pandas Timestamp, say, has finer digits, which are cut.
     plain = datetime.combine(moment.date(), moment.time(), moment.tzinfo).replace(fold=moment.fold)

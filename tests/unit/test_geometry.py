@@ -246,6 +246,31 @@ def test_a_radius_or_footprint_must_be_a_length(metres: float) -> None:
             made([(0, 0), (1, 1)], footprint=metres)
 
 
+@pytest.mark.parametrize(
+    ("made", "named"),
+    [
+        (lambda: Region.box(0, 0, math.nan, 0), "nan"),
+        (lambda: Region.box(0, 0, 1, 0), "no area"),
+        (lambda: Region.box(2, 0, 2, 5), "no area"),
+        (lambda: Region.box("0", 0, 1, 1), "'0'"),  # type: ignore[arg-type]
+        (lambda: Region.box(0, 0, 1, 2e9), "2000000000.0"),
+        (lambda: Region.around(None, 0, 1), "None"),  # type: ignore[arg-type]
+        (lambda: Region.around(1, 0, "1"), "'1'"),  # type: ignore[arg-type]
+        (lambda: Region.around(1e8, 0, 1e-9), "1e-09 m around"),
+    ],
+)
+def test_a_box_or_circle_of_what_is_no_number_or_has_no_area_is_refused(made: Callable[[], Region], named: str) -> None:
+    with pytest.raises(InvalidValue, match=named):
+        made()
+
+
+def test_numbers_of_numpy_make_boxes_and_circles() -> None:
+    of_numpy: list[Any] = [np.float32(0), np.int64(0), np.float64(1), np.int16(1)]
+
+    assert Region.box(*of_numpy) == Region.box(0, 0, 1, 1)
+    assert Region.around(*of_numpy[:3]) == Region.around(0, 0, 1)
+
+
 @pytest.mark.parametrize(("x", "y"), [(math.nan, 0), (0, math.inf), (1e9, 0)])
 def test_around_no_place_is_refused(x: float, y: float) -> None:
     with pytest.raises(InvalidValue):

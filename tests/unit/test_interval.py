@@ -320,3 +320,17 @@ def test_all_refusals_have_the_one_root() -> None:
         parse_time("never", what="a time")
     with pytest.raises(ValueError, match="never"):
         parse_time("never", what="a time")
+
+
+def test_the_time_of_pandas_that_is_none_is_refused() -> None:
+    pandas = pytest.importorskip("pandas")
+    with pytest.raises(InvalidValue, match="NaT, which is no time"):
+        Interval.at(pandas.NaT)
+    with pytest.raises(InvalidValue, match="the end of an interval is NaT"):
+        Interval(begin=at(0), end=pandas.NaT)
+
+
+def test_what_is_no_datetime_is_told_how_to_make_one() -> None:
+    numpy = pytest.importorskip("numpy")
+    with pytest.raises(InvalidValue, match=r"datetime64.*pandas.Timestamp"):
+        Interval.at(numpy.datetime64("2026-01-01"))
