@@ -254,8 +254,8 @@ def _check_polygon(polygon: Polygon) -> None:
         raise InvalidValue(f"a region is one shapely Polygon, not a {type(polygon).__name__}")
     if polygon.is_empty:
         raise InvalidValue("an empty polygon is no place: leave the region out when it is unknown")
-    if polygon.has_z:
-        raise InvalidValue("a region has no Z coordinate: drop it with shapely.force_2d")
+    if polygon.has_z or getattr(polygon, "has_m", False):
+        raise InvalidValue("a region has no Z and no M coordinate: drop it with shapely.force_2d")
     # The method, not shapely.is_valid: that switches warnings off and on around each call, for all threads.
     if not polygon.is_valid:
         if not np.isfinite(shapely.get_coordinates(polygon)).all():
@@ -264,5 +264,8 @@ def _check_polygon(polygon: Polygon) -> None:
             f"the polygon is not valid: {shapely.is_valid_reason(polygon)}. "
             f"Repair it first (shapely.make_valid) and count what you repaired"
         )
+    if not polygon.area > 0:
+        # So thin that its hull is a line: then no whole could have it as a part.
+        raise InvalidValue("a polygon is so small that its area is 0: widen it, by what the robot covers")
     if max(map(abs, polygon.bounds)) > LIMIT:
         raise InvalidValue(f"a polygon has a coordinate beyond {LIMIT:g} m: is its unit really the metre?")

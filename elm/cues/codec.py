@@ -63,9 +63,7 @@ def cue_to_json(cue: Cue) -> dict[str, Any]:
         case AgentCue(agent=agent):
             return {"op": "agent", "agent": agent}
         case DurationCue(compare=compare, duration=duration):
-            micros = duration // timedelta(microseconds=1)
-            seconds = micros // 10**6 if micros % 10**6 == 0 else micros / 10**6
-            return {"op": "duration", "compare": compare.value, "seconds": seconds}
+            return {"op": "duration", "compare": compare.value, **_seconds(duration)}
         case KinCue(relation=set_relation, uids=uids, kin=kin, transitive=transitive):
             named_uids = [str(uid) for uid in uids]
             return {
@@ -158,11 +156,28 @@ def _agent(fields: Fields) -> Cue:
 def _duration(fields: Fields) -> Cue:
     compare = named(fields.text("compare"), Comparison, what=fields.what_of("compare"))
     seconds = fields.number("seconds")
+    micros = 0 if fields.optional("microseconds") is None else fields.number("microseconds")
+    if not isinstance(micros, int):
+        raise InvalidValue(f"{fields.what_of('microseconds')} must be a whole number, not {micros!r}")
     try:
-        duration = timedelta(seconds=seconds)
+        duration = timedelta(seconds=seconds) + timedelta(microseconds=micros)
     except (OverflowError, ValueError) as error:
         raise InvalidValue(f"{fields.what_of('seconds')} is out of range: {seconds!r}") from error
     return DurationCue(compare=compare, duration=duration)
+
+
+def _seconds(duration: timedelta) -> dict[str, int | float]:
+    """A duration in seconds; where one number would lose the last digits, whole ones and microseconds beside them."""
+    whole, micros = divmod(duration // timedelta(microseconds=1), 10**6)
+    if micros == 0:
+        return {"seconds": whole}
+    if abs(whole) < _EXACT_SECONDS:
+        return {"seconds": duration.total_seconds()}
+    return {"seconds": whole, "microseconds": micros}
+
+
+_EXACT_SECONDS = 10**8
+"""Up to so many seconds, three years, a JSON number has all microseconds however it is read."""
 
 
 def _kin(fields: Fields) -> Cue:

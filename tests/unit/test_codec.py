@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from datetime import timedelta
 from typing import Any
@@ -9,6 +10,7 @@ from uuid import UUID
 
 import pytest
 from hypothesis import given
+from hypothesis import strategies as st
 from shapely.geometry import Polygon
 
 from elm import cues
@@ -114,6 +116,14 @@ EXAMPLES: list[tuple[Cue, dict[str, Any]]] = [
     ),
     (cues.lasting(">", timedelta(seconds=-1)), {"op": "duration", "compare": ">", "seconds": -1}),
     (cues.lasting("=", timedelta(microseconds=1)), {"op": "duration", "compare": "=", "seconds": 1e-06}),
+    (
+        cues.lasting(">", timedelta(days=200_000, microseconds=1)),
+        {"op": "duration", "compare": ">", "seconds": 17_280_000_000, "microseconds": 1},
+    ),
+    (
+        cues.lasting("<", timedelta.max),
+        {"op": "duration", "compare": "<", "seconds": 86_399_999_999_999, "microseconds": 999_999},
+    ),
     *(
         (
             build(relation, [TWO, ONE], transitive=transitive),
@@ -340,6 +350,9 @@ def test_what_is_no_object_is_no_cue(given_cue: Any) -> None:
         ({**DURATION, "seconds": "1"}, "'seconds'"),
         ({**DURATION, "seconds": True}, "'seconds'"),
         ({**DURATION, "seconds": 1e20}, "'seconds'"),
+        ({**DURATION, "microseconds": 0.5}, "'microseconds'.*whole number"),
+        ({**DURATION, "microseconds": "1"}, "'microseconds'"),
+        ({**DURATION, "microseconds": 10**30}, "out of range"),
         ({**DURATION, "seconds": 10**400}, "'seconds'"),
         ({**DURATION, "seconds": math.inf}, "'seconds'"),
         ({**PARTS, "uids": ONE_TEXT}, "'uids'"),
@@ -413,3 +426,10 @@ def test_an_outline_in_a_cue_keeps_its_holes() -> None:
     holed = Region(polygon=Polygon([(0, 0), (9, 0), (9, 9), (0, 9)], [[(1, 1), (2, 1), (2, 2)]]))
 
     assert cue_from_json(cue_to_json(cues.region("equal", holed))) == cues.region("equal", holed)
+
+
+@given(micros=st.integers(-86_399_999_913_600_000_000, 86_399_999_999_999_999_999))
+def test_every_duration_comes_back_to_the_microsecond(micros: int) -> None:
+    cue = cues.lasting(">=", timedelta(microseconds=micros))
+
+    assert cue_from_json(json.loads(json.dumps(cue_to_json(cue)))) == cue
