@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import re
 from enum import IntEnum
-from typing import Final, Self
+from typing import Any, Final, Self
 from urllib.parse import unquote_to_bytes
 
 import msgspec
 from msgspec.structs import force_setattr
 
+from armem_bridge.aron.data import Data, Dict, Int, String
+from armem_bridge.aron.links import date_time, dict_of, moment_of, scalar_of
 from armem_bridge.errors import ArmemError
 from armem_bridge.moments import GREATEST, INVALID, NOT_SET
 
@@ -21,6 +23,16 @@ INDEX_LIMIT: Final = 2**31 - 1
 
 _ESCAPE = re.compile(r"%(?![0-9A-Fa-f]{2})")
 _DIGITS = re.compile(r"[0-9]+")
+
+
+_LINK: Final = (
+    ("memoryName", "memory", String),
+    ("coreSegmentName", "core_segment", String),
+    ("providerSegmentName", "provider_segment", String),
+    ("entityName", "entity", String),
+    ("instanceIndex", "instance", Int),
+)
+"""Members of a link in data, the parts of the ID that they are, and their kinds: all but the timestamp."""
 
 
 class InvalidMemoryID(ArmemError, ValueError):
@@ -178,6 +190,34 @@ class MemoryID(msgspec.Struct, frozen=True, kw_only=True, order=True):
             part.replace("%", "%25").replace("/", "%2F") if isinstance(part, str) else str(part)
             for part in self._parts()
         )
+
+    def to_aron(self) -> Dict:
+        """This ID as data link to it (the type `MemoryID` of `aron.aliases`); what is not set as ArmarX has it."""
+        return Dict(
+            {
+                "memoryName": String(self.memory),
+                "coreSegmentName": String(self.core_segment),
+                "providerSegmentName": String(self.provider_segment),
+                "entityName": String(self.entity),
+                "timestamp": date_time(self.timestamp),
+                "instanceIndex": Int(self.instance),
+            }
+        )
+
+    @classmethod
+    def from_aron(cls, data: Data | None) -> Self:
+        """The ID that a link in data names; members that the data lack are not set, others are passed over.
+
+        Raises `NotRealized` for what is no link, `InvalidMemoryID` for names and numbers that none has.
+        """
+        members: dict[str, Any] = {}
+        link = dict_of(data, "a link to memory")
+        for key, name, kind in _LINK:
+            if key in link:
+                members[name] = scalar_of(link[key], kind, f"{key} of a link to memory")
+        if "timestamp" in link:
+            members["timestamp"] = max(moment_of(link["timestamp"]), NOT_SET)
+        return cls(**members)
 
     @classmethod
     def parse(cls, text: str) -> Self:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
+from numbers import Integral
 from typing import Final
 
 from armem_bridge.errors import ArmemError
@@ -40,11 +41,13 @@ def is_set(moment: int) -> bool:
 
 
 def as_moment(value: int | datetime, *, what: str) -> int:
-    """`value` in microseconds since 1970; integers that 64 bits hold are moments already.
+    """`value` in microseconds since 1970; integers that 64 bits hold are moments already, numpy's too.
 
     Raises `InvalidMoment`, naming `what`, for anything else: other kinds of values, datetimes without a
     zone, and datetimes before 1970, which negative numbers cannot say.
     """
+    if type(value) is not int and isinstance(value, Integral) and not isinstance(value, bool):
+        value = int(value)
     if type(value) is int:
         if not INVALID <= value <= GREATEST:
             raise InvalidMoment(f"{what} does not fit into 64 bits: {value}. Times are microseconds since 1970")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from contextlib import ExitStack
 from types import MappingProxyType, TracebackType
-from typing import TYPE_CHECKING, Final, Self, assert_never
+from typing import TYPE_CHECKING, Self, assert_never
 
 import msgspec
 
@@ -15,7 +15,7 @@ from armem_bridge.forgetting.online import OnlineForgetting
 from armem_bridge.forgetting_gate import ForgettingGate
 from armem_bridge.long_term import ROOT, LongTermMemory, RobotPlaces, SubjectFinder
 from armem_bridge.long_term.consolidation import STOP_TIMEOUT
-from armem_bridge.long_term.robot_place import MAX_AGE
+from armem_bridge.long_term.robot_place import FOOTPRINT, MAX_AGE
 from armem_bridge.long_term.subjects import RADIUS
 from armem_bridge.moments import Clock, now
 from armem_bridge.names import MemoryNameSystem
@@ -24,9 +24,6 @@ from armem_bridge.working.status import ServerStatus
 
 if TYPE_CHECKING:
     from armem_bridge.ice import Edge, EdgeStatus, MemoryClient
-
-FOOTPRINT: Final = 0.3
-"""The radius of a robot in metres unless the configuration says otherwise."""
 
 
 class ServiceClosed(ArmemError):
@@ -118,8 +115,8 @@ class Service:
     def stop(self, timeout: float = STOP_TIMEOUT) -> None:
         """Stop everything, and make durable what waits; again changes nothing.
 
-        `NotConsolidated` where that takes longer than `timeout` seconds: it is tried on until the process ends, and
-        stopping again waits again.
+        `NotConsolidated` where for `timeout` seconds nothing of it becomes so: it is tried on until the process ends,
+        and stopping again waits again.
         """
         self._running.close()
         if self._archive is not None:

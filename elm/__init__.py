@@ -12,14 +12,17 @@ if TYPE_CHECKING:
     from elm.event import Event, PartialEvent, Payload, StoredEvent
     from elm.geometry import Region
     from elm.interval import Interval
+    from elm.query import ByFeature, Nearest
     from elm.taxonomy import EventType
 
 __all__ = [
+    "ByFeature",
     "ElmError",
     "Event",
     "EventType",
     "Interval",
     "Memory",
+    "Nearest",
     "PartialEvent",
     "Payload",
     "Region",
@@ -30,11 +33,13 @@ __all__ = [
 
 # Names are imported when first used: `import elm` stays fast, and the command line with it.
 _HOME = {
+    "ByFeature": "elm.query",
     "ElmError": "elm.errors",
     "Event": "elm.event",
     "EventType": "elm.taxonomy",
     "Interval": "elm.interval",
     "Memory": "elm.app",
+    "Nearest": "elm.query",
     "PartialEvent": "elm.event",
     "Payload": "elm.event",
     "Region": "elm.geometry",

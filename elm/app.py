@@ -8,7 +8,9 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Self, TypedDict, Unpack
 from uuid import UUID
 
+from elm.arguments import check_several
 from elm.cues.algebra import Cue
+from elm.errors import InvalidValue
 from elm.event import Event, StoredEvent
 from elm.log import Log, LoggedStore, LogKind, Tick
 from elm.query import Cursor, Order
@@ -51,7 +53,11 @@ class Memory:
 
     def add_types(self, types: Iterable[EventType]) -> TypesAdded:
         """Add event types and parents, in any order, at any time; a repeated type gains parents."""
-        return self.store.add_types(list(types))
+        given = list(check_several(types, what="event types"))
+        for each in given:
+            if not isinstance(each, EventType):
+                raise InvalidValue(f"event types are given as EventType(name=...), not as {each!r:.80}")
+        return self.store.add_types(given)
 
     def add_type(self, name: str, *parents: str) -> TypesAdded:
         """Add one event type below its parents."""
@@ -69,13 +75,13 @@ class Memory:
         """Keep all of these events or none; see `Writer.commit_all`."""
         return self.writer.commit_all(events, recorded_at=recorded_at)
 
-    def close_event(self, uid: UUID, end: datetime) -> Closed:
+    def close_event(self, uid: UUID | str | int, end: datetime) -> Closed:
         """End an event that is still going on; see `Writer.close`."""
         return self.writer.close(uid, end)
 
     def load(
         self,
-        events: Iterable[Event | Arrival],
+        events: Iterable[Event | StoredEvent | Arrival],
         *,
         progress: Callable[[int], None] | None = None,
         refused: Callable[[Arrival, str], None] | None = None,
@@ -86,7 +92,7 @@ class Memory:
 
     def forget(
         self,
-        what: Cue | Iterable[UUID],
+        what: Cue | Iterable[UUID | str],
         *,
         dry_run: bool = False,
         progress: Callable[[int], None] | None = None,
@@ -94,6 +100,8 @@ class Memory:
         """Forget the events that match a cue or have these uids, or say what would go; see `elm.forgetting.forget`."""
         from elm.forgetting import forget
 
+        if not isinstance(dry_run, bool):
+            raise InvalidValue(f"dry_run is True or False, not {dry_run!r:.80}")
         return forget(self.store, what, dry_run=dry_run, progress=progress)
 
     def recall(
@@ -107,8 +115,8 @@ class Memory:
         """The events that match a cue; see `Recollector.recall`."""
         return self.recollector.recall(cue, order=order, limit=limit, after=after)
 
-    def get(self, name: UUID | int) -> StoredEvent:
-        """The event with this uid or id."""
+    def get(self, name: UUID | str | int) -> StoredEvent:
+        """The event with this uid or id; see `Recollector.get`."""
         return self.recollector.get(name)
 
     @property
@@ -137,7 +145,7 @@ class Memory:
         """What finds complex events as the log grows, once it is started; see `RecognitionManager`."""
         from elm.recognition import RecognitionManager
 
-        return RecognitionManager(self.store, tuple(recognizers), **settings)
+        return RecognitionManager(self.store, tuple(check_several(recognizers, what="recognizers")), **settings)
 
     def recognize(
         self,
@@ -151,7 +159,7 @@ class Memory:
         """Find complex events in the log as it stands (the paper's R*); see `elm.recognition.replay`."""
         from elm.recognition import replay
 
-        found = tuple(recognizers)
+        found = tuple(check_several(recognizers, what="recognizers"))
         return replay(self.store, found, since=since, complete=complete, timing=timing, commit=commit)
 
     def statistics(self) -> Statistics:
@@ -180,4 +188,6 @@ def connect(dsn: str | None = None, memory: str = "elm") -> Memory:
     """
     from elm.storage import open_store
 
+    if dsn is not None and not isinstance(dsn, str):
+        raise InvalidValue(f"the DSN of a memory is text such as 'host=... dbname=...', not {dsn!r:.80}")
     return Memory(open_store(dsn, memory))

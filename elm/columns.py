@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from itertools import islice
 from typing import Any
 from uuid import UUID
 
 import msgspec
 
+from elm.chunks import chunks_of
 from elm.errors import MissingPackage
 from elm.event import StoredEvent
 from elm.geometry import Region
 
 BATCH = 10_000
-"""Events in a record batch unless asked otherwise."""
+"""Events in a record batch unless asked otherwise, or large payloads fill it before."""
 
 
 def require_pyarrow() -> Any:
@@ -54,10 +54,9 @@ def schema() -> Any:
 
 
 def batches_of(events: Iterable[StoredEvent], size: int = BATCH) -> Iterator[Any]:
-    """The events as pyarrow.RecordBatches of at most `size` rows, each made when it is asked for."""
+    """The events as pyarrow.RecordBatches of at most `size` rows, fewer of large payloads, each made when asked for."""
     pa, columns = require_pyarrow(), schema()
-    stream = iter(events)
-    while chunk := list(islice(stream, size)):
+    for chunk in chunks_of(events, most=size, payload=_payload):
         values = _columns(chunk)
         yield pa.record_batch([_array(pa, values[field.name], field.type) for field in columns], schema=columns)
 
@@ -79,11 +78,15 @@ def _columns(events: list[StoredEvent]) -> dict[str, list[Any]]:
         "features": [msgspec.json.encode(event.features).decode() for event in events],
         "agent": [event.agent for event in events],
         "media_type": [None if event.payload is None else event.payload.media_type for event in events],
-        "payload": [None if event.payload is None else event.payload.data for event in events],
+        "payload": [*map(_payload, events)],
         "parts": [[part.bytes for part in event.parts] for event in events],
         "wholes": [[whole.bytes for whole in event.wholes] for event in events],
         "recorded_at": [event.recorded_at for event in events],
     }
+
+
+def _payload(event: StoredEvent) -> bytes | None:
+    return None if event.payload is None else event.payload.data
 
 
 def _place(name: str, regions: list[Region | None]) -> dict[str, list[Any]]:

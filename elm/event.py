@@ -6,12 +6,14 @@ import hashlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from datetime import datetime
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 from uuid import UUID
 
 import msgspec
 from uuid_utils.compat import uuid7
 
+from elm.arguments import as_uid, as_uids
 from elm.errors import CycleRefused, InvalidValue
 from elm.features import Feature, FeatureValue, by_canonical, identity
 from elm.geometry import Region
@@ -54,7 +56,8 @@ class Event:
     (Defs 7 and 10), and given ones must agree with that. `region` is where the observer was, `subject`
     where the thing is that the event is about; None means unknown. `features` is a set of (name, value)
     pairs, given as pairs or as a mapping. `parts` are uids of the direct sub-events, in an order that is
-    kept though they compare as a set. A `uid` makes committing idempotent; by default it is a new UUIDv7.
+    kept though they compare as a set. A `uid` makes committing idempotent; by default it is a new UUIDv7. Uids may be
+    given as text.
     """
 
     type: str
@@ -81,8 +84,8 @@ class Event:
             features: Mapping[str, FeatureValue] | Iterable[tuple[str, FeatureValue]] = ...,
             agent: str | None = ...,
             payload: Payload | None = ...,
-            parts: Iterable[UUID] = ...,
-            uid: UUID = ...,
+            parts: Iterable[UUID | str] = ...,
+            uid: UUID | str = ...,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -95,17 +98,12 @@ class Event:
         ):
             value = getattr(self, name)
             if value is not None and not isinstance(value, kind):
-                raise InvalidValue(f"the {name} of an event is of class {kind.__name__}, not {value!r:.80}")
+                raise InvalidValue(f"the {name} of an event is an elm.{_MADE[kind]}, not {value!r:.80}")
         if self.agent is not None:
             object.__setattr__(self, "agent", check_short_name(self.agent, what="the agent of an event"))
         if not isinstance(self.uid, UUID):
-            raise InvalidValue(f"the uid of an event is a uuid.UUID, not {self.uid!r}")
-        if isinstance(self.parts, str) or not isinstance(self.parts, Iterable):
-            raise InvalidValue(f"the parts of an event are several uids, not {self.parts!r:.80}")
-        parts = tuple(self.parts)
-        for part in parts:
-            if not isinstance(part, UUID):
-                raise InvalidValue(f"the parts of an event are uids (uuid.UUID), not {part!r:.80}")
+            object.__setattr__(self, "uid", as_uid(self.uid, what="the uid of an event"))
+        parts = as_uids(self.parts, what="the parts of an event")
         if len(set(parts)) != len(parts):
             raise InvalidValue(f"event {self.uid} names a part twice: name each once")
         if self.uid in parts:
@@ -140,6 +138,16 @@ class Event:
         return next(iter(self.values(name)), None)
 
 
+_MADE: Mapping[type, str] = MappingProxyType(
+    {
+        Interval: "Interval(begin=..., end=...)",
+        Region: "Region(polygon=...)",
+        Payload: "Payload(data=...)",
+    }
+)
+"""How the components are made that are values of their own."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PartialEvent:
     """What an event source reports before its place is known (section V-C of the paper): type and time at least."""
@@ -155,6 +163,7 @@ class PartialEvent:
     def __post_init__(self) -> None:
         event = self.complete(region=None)
         object.__setattr__(self, "features", event.features)
+        object.__setattr__(self, "uid", event.uid)
 
     def complete(self, *, region: Region | None) -> Event:
         """The event, with the place that a location monitor found; None when it stays unknown."""
@@ -260,7 +269,11 @@ class StoredEvent:
         return next(iter(self.values(name)), None)
 
     def as_event(self) -> Event:
-        """The event as it stands now, fit to be committed to another memory."""
+        """The event as it stands now, fit to be committed to another memory.
+
+        It says nothing of when this memory learned of it: commit it with `recorded_at=stored.recorded_at` to keep
+        that, as a load of stored events does by itself.
+        """
         return Event(
             type=self.type,
             interval=self.interval,
@@ -322,6 +335,13 @@ def content_hash(event: Event) -> bytes:
         sorted(part.bytes for part in event.parts),
     )
     return hashlib.sha256(msgspec.msgpack.encode(canonical_form)).digest()
+
+
+def hashed_uid(data: bytes) -> UUID:
+    """A UUID of version 8 (RFC 9562) made of the SHA-256 of `data`: the same wherever and whenever it is made."""
+    number = int.from_bytes(hashlib.sha256(data).digest()[:16], "big")
+    number = number & ~(0xF << 76) | 0x8 << 76
+    return UUID(int=number & ~(0x3 << 62) | 0x2 << 62)
 
 
 def _place(region: Region | None) -> tuple[str, bytes] | None:

@@ -11,7 +11,7 @@ import msgspec
 from elm.errors import InvalidValue
 from elm.event import Event, Payload, StoredEvent
 from elm.features import as_features
-from elm.fields import Fields, base64_text, parse_uid, time_text
+from elm.fields import Fields, base64_text, parse_uid, shown, time_text
 from elm.geometry import Region
 from elm.interval import Interval, parse_time
 from elm.taxonomy import EventType
@@ -179,7 +179,7 @@ def type_to_json(event_type: EventType) -> dict[str, Any]:
 
 def _interval(given: Any) -> Interval:
     if not isinstance(given, list) or len(given) != 2:
-        raise InvalidValue(f"'interval' of an event is a pair [BEGIN, END], not {given!r:.80}")
+        raise InvalidValue(f"'interval' of an event is a pair [BEGIN, END], not {shown(given)}")
     begin, end = given
     return Interval(
         begin=parse_time(begin, what="the begin of an interval"),
@@ -205,7 +205,7 @@ def _pairs(given: Any) -> list[tuple[str, Any]]:
     if given is None:
         return []
     if not isinstance(given, list) or not all(isinstance(pair, list) for pair in given):
-        raise InvalidValue(f"'features' of an event is an array of pairs [NAME, VALUE], not {given!r:.80}")
+        raise InvalidValue(f"'features' of an event is an array of pairs [NAME, VALUE], not {shown(given)}")
     return given
 
 

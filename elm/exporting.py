@@ -5,21 +5,17 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import replace
-from itertools import islice
 from typing import Any, BinaryIO, TypeVar
-from uuid import UUID
 
 import msgspec
 
 from elm.columns import without_extensions
-from elm.cues.algebra import And, UidCue
+from elm.cues.algebra import And
 from elm.errors import MissingPackage
 from elm.event import StoredEvent
 from elm.exchange import event_to_json, to_line, tombstone_to_json
 from elm.fields import time_text
 from elm.geometry import Region
-from elm.query import Order, Query
 from elm.recollector import Recollection
 from elm.tombstone import RunTombstone, Tombstone
 
@@ -41,38 +37,10 @@ def with_parts(recollection: Recollection) -> Iterator[Exported]:
     Before them come the tombstones of those parts that were forgotten; of all events all tombstones, also those
     of each forgetting.
     """
-    store, query = recollection.store, replace(recollection.query, order=Order.ID)
+    store, query = recollection.store, recollection.query
     if query.cue == And() and query.limit is None and query.after is None:
-        events = store.find(query)
-        # The view that they come from is as of now: what is forgotten from here on is in it.
-        first = next(events, None)
-        yield from store.run_tombstones()
-        yield from store.tombstones()
-        if first is not None:
-            yield first
-        yield from events
-        return
-    ids: set[int] = set()
-    known: set[UUID] = set()
-    found: set[UUID] = set()
-    wanted: set[UUID] = set()
-
-    def take(events: Iterable[StoredEvent]) -> None:
-        for event in events:
-            ids.add(event.id)
-            known.add(event.uid)
-            found.add(event.uid)
-            wanted.update(event.parts)
-
-    take(recollection)
-    while missing := wanted - known:
-        known |= missing
-        for uids in _chunks(missing):
-            take(store.find(Query(cue=UidCue(uids=tuple(uids)))))
-    for uids in _chunks(wanted - found):
-        yield from store.tombstones(uids)
-    for chunk in _chunks(sorted(ids)):
-        yield from store.get(chunk)
+        return store.everything()
+    return store.with_parts(query)
 
 
 def jsonl(events: Iterable[Exported]) -> Iterator[bytes]:
@@ -182,9 +150,3 @@ def _drained(text: io.StringIO) -> bytes:
     text.seek(0)
     text.truncate()
     return written
-
-
-def _chunks(items: Iterable[_Item]) -> Iterator[list[_Item]]:
-    rest = iter(items)
-    while chunk := list(islice(rest, _CHUNK)):
-        yield chunk

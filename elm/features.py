@@ -52,7 +52,10 @@ def check_value(name: str, value: object) -> FeatureValue:
         return check_text(value, what=f"the value of feature {name!r}")
     if isinstance(value, int):
         if not _INT64[0] <= value <= _INT64[1]:
-            raise InvalidValue(f"feature {name!r} is an integer beyond 64 bits ({value}): give it as text")
+            raise InvalidValue(
+                f"feature {name!r} is an integer beyond 64 bits ({value}): "
+                f"give it as a float, or as text where every digit counts"
+            )
         return int(value)
     if isinstance(value, float):
         if not math.isfinite(value):

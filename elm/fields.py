@@ -8,6 +8,8 @@ from datetime import UTC, datetime
 from typing import Any
 from uuid import UUID
 
+import msgspec
+
 from elm.errors import InvalidValue
 
 
@@ -16,7 +18,7 @@ class Fields:
 
     def __init__(self, given: Any, *, what: str) -> None:
         if not isinstance(given, dict):
-            raise InvalidValue(f"{what} is a JSON object, not {given!r:.80}")
+            raise InvalidValue(f"{what} is a JSON object, not {shown(given)}")
         self._given = given
         self._what = what
         self._taken: set[str] = set()
@@ -50,21 +52,21 @@ class Fields:
         """The text `key`."""
         value = self.take(key)
         if not isinstance(value, str):
-            raise InvalidValue(f"{self.what_of(key)} must be text, not {value!r:.80}")
+            raise InvalidValue(f"{self.what_of(key)} must be text, not {shown(value)}")
         return value
 
     def number(self, key: str) -> int | float:
         """The number `key`."""
         value = self.take(key)
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise InvalidValue(f"{self.what_of(key)} must be a number, not {value!r:.80}")
+            raise InvalidValue(f"{self.what_of(key)} must be a number, not {shown(value)}")
         return value
 
     def items(self, key: str) -> list[Any]:
         """The array `key`."""
         value = self.take(key)
         if not isinstance(value, list):
-            raise InvalidValue(f"{self.what_of(key)} must be an array, not {value!r:.80}")
+            raise InvalidValue(f"{self.what_of(key)} must be an array, not {shown(value)}")
         return value
 
     def texts(self, key: str) -> list[str]:
@@ -72,7 +74,7 @@ class Fields:
         values = self.items(key)
         for value in values:
             if not isinstance(value, str):
-                raise InvalidValue(f"{self.what_of(key)} must be an array of texts, not of {value!r:.80}")
+                raise InvalidValue(f"{self.what_of(key)} must be an array of texts, not of {shown(value)}")
         return values
 
     def uids(self, key: str) -> tuple[UUID, ...]:
@@ -88,6 +90,16 @@ class Fields:
             raise InvalidValue(f"{self.what_of(key)} is not base64: {error}") from error
 
 
+def shown(given: Any) -> str:
+    """The beginning of a value for a message, as it stands in JSON."""
+    try:
+        text = msgspec.json.encode(given).decode()
+    except (TypeError, ValueError, RecursionError):
+        # No JSON: it came from Python.
+        text = repr(given)
+    return text[:80]
+
+
 def parse_uid(given: Any, *, what: str) -> UUID:
     """The UUID a text names."""
     if isinstance(given, str):
@@ -95,7 +107,7 @@ def parse_uid(given: Any, *, what: str) -> UUID:
             return UUID(given)
         except ValueError:
             pass
-    raise InvalidValue(f"{what} is not a UUID: {given!r:.80}")
+    raise InvalidValue(f"{what} is not a UUID: {shown(given)}")
 
 
 def base64_text(data: bytes) -> str:

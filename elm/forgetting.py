@@ -10,11 +10,13 @@ from uuid import UUID
 
 from uuid_utils.compat import uuid7
 
+from elm.arguments import as_count, as_uid, check_callable
 from elm.cues.algebra import Cue, UidCue
 from elm.errors import InvalidValue
 from elm.log import Consumer, LoggedStore
-from elm.query import Order, Query
+from elm.query import MOST_ID, Order, Query
 from elm.recognition.checkpoint import held_events
+from elm.recognition.reports import StrandReport
 from elm.tombstone import Forgotten
 
 FORGET_BATCH = 2_000
@@ -27,10 +29,10 @@ class ForgettingReport:
     """What a forgetting did, or a dry run would do.
 
     Of the `events` that went, `tombstones` are parts of remaining ones and left tombstones of their own; the rest
-    has one together, that of the `run`, which is None where nothing went. `dissolved` tombstones of earlier runs
-    went because no remaining event has them as a part any more. Not forgotten: what is `still_open`, and what is
-    `held` by recognizers, which have not finished with it. `unknown` uids name no event. `bytes` is how much the
-    events took, roughly and without indexes; `types` counts them by type.
+    has one together, that of the forgetting run, `run`, which is None where nothing went. `dissolved` tombstones of
+    earlier forgetting runs went because no remaining event has them as a part any more. Not forgotten: what is
+    `still_open`, and what is `held` by recognizers, which have not finished with it. `unknown` uids name no event.
+    `bytes` is how much the events took, roughly and without indexes; `types` counts them by type.
     """
 
     run: UUID | None
@@ -46,7 +48,7 @@ class ForgettingReport:
 
 def forget(
     store: LoggedStore,
-    what: Cue | Iterable[UUID],
+    what: Cue | Iterable[UUID | str],
     *,
     dry_run: bool = False,
     batch: int = FORGET_BATCH,
@@ -58,8 +60,8 @@ def forget(
     is gone, and the same call again forgets the rest. Events still going on stay, and so do those that a recognizer
     holds: it would lose what it has not finished. `progress` is told the number of events dealt with.
     """
-    if isinstance(batch, bool) or not isinstance(batch, int) or batch < 1:
-        raise InvalidValue(f"a batch of a forgetting has at least one event, not {batch!r}")
+    size = as_count(batch, what="a batch of a forgetting", least=1, most=MOST_ID)
+    check_callable(progress, what="progress is a function that a forgetting tells what it does")
     ids, unknown = _selected(store, what)
     holding = _held(store.log.consumers()) if ids else set()
     going = sorted((number for number in ids if number not in holding), reverse=True)
@@ -68,23 +70,20 @@ def forget(
     if dry_run:
         told.append(store.would_forget(going))
     else:
-        for start in range(0, len(going), batch):
-            told.append(store.forget(going[start : start + batch], run=run, at=at))
+        for start in range(0, len(going), size):
+            told.append(store.forget(going[start : start + size], run=run, at=at))
             if progress is not None:
-                progress(min(start + batch, len(going)))
+                progress(min(start + size, len(going)))
     return _report(told, None if dry_run else run, held=len(ids) - len(going), unknown=unknown)
 
 
-def _selected(store: LoggedStore, what: Cue | Iterable[UUID]) -> tuple[set[int], int]:
+def _selected(store: LoggedStore, what: Cue | Iterable[UUID | str]) -> tuple[set[int], int]:
     """The ids of the events that are meant, and how many uids name none."""
     if isinstance(what, Cue):
         return set(store.ids(Query(cue=what, order=Order.ID))), 0
     if isinstance(what, str) or not isinstance(what, Iterable):
         raise InvalidValue(f"what to forget is a cue (elm.cues) or several uids, not {what!r:.80}")
-    uids = list(dict.fromkeys(what))
-    for uid in uids:
-        if not isinstance(uid, UUID):
-            raise InvalidValue(f"events to forget are named by uids (uuid.UUID), not {uid!r:.80}")
+    uids = list(dict.fromkeys(as_uid(each, what="what names an event to forget") for each in what))
     found: set[int] = set()
     for start in range(0, len(uids), _UIDS_AT_ONCE):
         named = UidCue(uids=tuple(uids[start : start + _UIDS_AT_ONCE]))
@@ -96,7 +95,7 @@ def _held(consumers: Iterable[Consumer]) -> set[int]:
     """The ids of the events that checkpoints of recognizers refer to."""
     held: set[int] = set()
     for consumer in consumers:
-        if consumer.state is not None and "recognizers" in consumer.report:
+        if consumer.state is not None and StrandReport.of(consumer) is not None:
             held.update(held_events(consumer.state))
     return held
 

@@ -71,24 +71,29 @@ class Tick:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Consumer:
-    """A named reader of the log and how far it got.
-
-    `position` is the last entry dealt with; `state` what the consumer knew after entry `checkpoint`, which is
-    not after `position`; `report` what it tells of itself, plain JSON.
-    """
+class Progress:
+    """How far a named reader of the log got: the last entry dealt with, and what it tells of itself, plain JSON."""
 
     name: str
     position: int
-    checkpoint: int
-    state: bytes | None
     report: Mapping[str, Any]
     updated_at: datetime
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Step:
-    """How far a consumer went: from `before` to `position`; with a `state` also its checkpoint moves to there."""
+class Consumer(Progress):
+    """A named reader of the log, how far it got, and what it knew: `state`, after entry `checkpoint`.
+
+    The checkpoint is not after the position. States may be large: who does not need them asks for the progress.
+    """
+
+    checkpoint: int
+    state: bytes | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Advance:
+    """How far a consumer goes: from `before` to `position`; with a `state` also its checkpoint moves to there."""
 
     name: str
     before: int
@@ -98,7 +103,7 @@ class Step:
 
     def __post_init__(self) -> None:
         if not 0 <= self.before <= self.position <= MOST_ID:
-            raise InvalidValue(f"consumer {self.name!r} cannot step from position {self.before} to {self.position}")
+            raise InvalidValue(f"consumer {self.name!r} cannot advance from position {self.before} to {self.position}")
 
 
 class Log(Protocol):
@@ -109,10 +114,14 @@ class Log(Protocol):
     """
 
     def head(self) -> int:
-        """Bring everything committed so far into the log; the position of the last entry, 0 when there is none."""
+        """Bring everything committed so far into the log; the position of the last entry, 0 when there is none.
+
+        Who may read the memory but not write to it brings in nothing: it gets the last entry that others brought in,
+        and what was committed since is not in the log for it until one of them asks for the head.
+        """
 
     def read(self, after: int, limit: int) -> list[LogEntry]:
-        """Up to `limit` entries behind position `after`, of those that a call of `head` brought in."""
+        """Up to `limit` entries behind position `after`, of those that a call of `head` brought in, whoever made it."""
 
     def write(self, ticks: Sequence[Tick]) -> None:
         """Write entries of clocks."""
@@ -120,16 +129,19 @@ class Log(Protocol):
     def consumers(self) -> list[Consumer]:
         """All consumers, by name."""
 
+    def progress(self) -> list[Progress]:
+        """How far all consumers got, by name, without what they know."""
+
     def consumer(self, name: str) -> Consumer | None:
         """The consumer of this name."""
 
     def register(self, name: str, *, position: int = 0) -> Consumer:
         """The consumer of this name; a new one begins behind `position`."""
 
-    def advance(self, steps: Sequence[Step], results: Sequence[Arrival] = ()) -> list[Committed]:
+    def advance(self, advances: Sequence[Advance], results: Sequence[Arrival] = ()) -> list[Committed]:
         """Commit results, in the order given but parts first, and move consumers on, all in one transaction.
 
-        A consumer that is not at its step's `before` refuses the whole call with `PositionLost`: another
+        A consumer that is not at the `before` of its advance refuses the whole call with `PositionLost`: another
         process has done the work.
         """
 
@@ -146,7 +158,7 @@ class Log(Protocol):
         """Remember definitions; the first fingerprint of a name stays."""
 
     def wait(self, after: int, seconds: float) -> bool:
-        """Wait until there is more than position `after`, at most `seconds`; whether there is."""
+        """Wait until `head` is behind position `after`, at most `seconds`; whether it is."""
 
     def exclusive(self, name: str) -> AbstractContextManager[None]:
         """Be the only one to work under this name while the context is open; `ConsumerBusy` when another does."""
@@ -175,10 +187,10 @@ def unknown_consumer(name: str) -> UnknownConsumer:
     return UnknownConsumer(f"the log has no consumer {name!r}: register it first, or correct the name")
 
 
-def position_lost(step: Step, found: int) -> PositionLost:
-    """The error of a consumer that is elsewhere than where its step begins."""
+def position_lost(advance: Advance, found: int) -> PositionLost:
+    """The error of a consumer that is elsewhere than where its advance begins."""
     return PositionLost(
-        f"consumer {step.name!r} is at position {found}, not at {step.before}: another process moved it, "
+        f"consumer {advance.name!r} is at position {found}, not at {advance.before}: another process moved it, "
         f"and nothing of this call was kept. Read the consumer again and go on from there"
     )
 

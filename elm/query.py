@@ -7,12 +7,14 @@ from datetime import datetime, timedelta
 from enum import StrEnum
 from typing import Any, Self
 
-from elm.cues.algebra import And, Cue
-from elm.cues.relations import Place
+from elm.arguments import as_count
+from elm.cues.algebra import And, Cue, is_cue
+from elm.cues.relations import Place, named
 from elm.errors import InvalidValue
 from elm.event import StoredEvent
 from elm.geometry import Region
 from elm.interval import as_utc, from_micros, to_micros
+from elm.text import check_name
 
 MOST_ID = 2**63 - 1
 """Greatest id of an event, and most events that can be asked for."""
@@ -33,6 +35,18 @@ class Nearest:
     to: Region
     place: Place = Place.REGION
 
+    def __post_init__(self) -> None:
+        if not isinstance(self.to, Region):
+            raise InvalidValue(f"the nearest are those to a Region(polygon=...), not to {self.to!r:.80}")
+        object.__setattr__(self, "place", named(self.place, Place, what="the place that is near"))
+
+
+def as_order(given: object) -> Order | Nearest:
+    """The order that `given` is or names."""
+    if isinstance(given, Nearest):
+        return given
+    return named(given, Order, what="the order of a recall", also=", or elm.Nearest(to=...) for the nearest first")
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cursor:
@@ -43,12 +57,13 @@ class Cursor:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "begin", as_utc(self.begin, what="the begin of a cursor"))
-        if not 0 <= self.id <= MOST_ID:
-            raise InvalidValue(f"the id of a cursor is a number from 0 to {MOST_ID}, not {self.id!r}")
+        object.__setattr__(self, "id", as_count(self.id, what="the id of a cursor", least=0, most=MOST_ID))
 
     @classmethod
     def after(cls, event: StoredEvent) -> Self:
         """The cursor of a page that ends with `event`."""
+        if not isinstance(event, StoredEvent):
+            raise InvalidValue(f"a cursor is that of a StoredEvent, not of {event!r:.80}")
         return cls(begin=event.interval.begin, id=event.id)
 
     def __str__(self) -> str:
@@ -57,6 +72,8 @@ class Cursor:
     @classmethod
     def parse(cls, text: str) -> Self:
         """The cursor that `str` wrote."""
+        if not isinstance(text, str):
+            raise InvalidValue(f"a cursor is read from text, not from {text!r:.80}")
         try:
             micros, number = map(int, text.split("."))
             return cls(begin=from_micros(micros), id=number)
@@ -74,8 +91,15 @@ class Query:
     after: Cursor | None = None
 
     def __post_init__(self) -> None:
-        if self.limit is not None and (isinstance(self.limit, bool) or not 0 <= self.limit <= MOST_ID):
-            raise InvalidValue(f"a limit is a number of events, 0 to {MOST_ID}, not {self.limit!r}")
+        _check_cue(self.cue, what="a recall goes by")
+        object.__setattr__(self, "order", as_order(self.order))
+        if self.limit is not None:
+            object.__setattr__(self, "limit", as_count(self.limit, what="the limit of a recall", least=0, most=MOST_ID))
+        if self.after is not None and not isinstance(self.after, Cursor):
+            raise InvalidValue(
+                f"what a page goes on after is the Cursor that the last one ended with, not {self.after!r:.80}: "
+                f"of a cursor as text make Cursor.parse(text)"
+            )
         if self.after is not None and isinstance(self.order, Nearest):
             raise InvalidValue("paging goes by begin or id; the nearest events are asked for with a limit")
 
@@ -103,6 +127,9 @@ class ByFeature:
     """Group by the values of one feature; an event with several of them counts in each, without any in None."""
 
     name: str
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "name", check_name(self.name, what="the feature to group by"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -140,6 +167,14 @@ class Join:
     cue: Cue
     same_region: bool = False
 
+    def __post_init__(self) -> None:
+        if not isinstance(self.anchors, Query):
+            raise InvalidValue(f"the anchors of a join are those of a Query, not {self.anchors!r:.80}")
+        object.__setattr__(self, "relation", named(self.relation, JoinRelation, what="the relation of a join"))
+        _check_cue(self.cue, what="the neighbours in time are found by")
+        if not isinstance(self.same_region, bool):
+            raise InvalidValue(f"same_region is True or False, not {self.same_region!r:.80}")
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ConditionRows:
@@ -162,3 +197,8 @@ class Explanation:
     plan: str
     events: int
     conditions: tuple[ConditionRows, ...]
+
+
+def _check_cue(given: object, *, what: str) -> None:
+    if not is_cue(given):
+        raise InvalidValue(f"{what} a cue (elm.cues), not by {given!r:.80}")

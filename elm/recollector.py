@@ -7,11 +7,26 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 from uuid import UUID
 
+from elm.arguments import as_count, as_uid_or_id
 from elm.cues.algebra import And, Cue, UidCue
 from elm.cues.relations import named
 from elm.errors import InvalidValue, MissingPackage, UnknownEvent
 from elm.event import StoredEvent
-from elm.query import ByFeature, Cursor, Explanation, Group, Grouping, Join, JoinRelation, Nearest, Order, Page, Query
+from elm.query import (
+    MOST_ID,
+    ByFeature,
+    Cursor,
+    Explanation,
+    Group,
+    Grouping,
+    Join,
+    JoinRelation,
+    Nearest,
+    Order,
+    Page,
+    Query,
+    as_order,
+)
 from elm.store import Store
 
 OrderName = Order | Nearest | Literal["begin", "-begin", "id"]
@@ -56,6 +71,10 @@ class Recollection:
             return self.first() is not None
         return self.store.exists(self.query.cue)
 
+    def __bool__(self) -> bool:
+        """Whether there is any event, as `exists()` finds out; how many there are says `count()`."""
+        return self.exists()
+
     def ids(self) -> Iterator[int]:
         """The ids in order, without the events."""
         return self.store.ids(self.query)
@@ -65,9 +84,11 @@ class Recollection:
 
         Keyset paging by (begin, id): events that are committed meanwhile neither repeat nor hide others.
         """
-        if isinstance(self.query.order, Nearest) or self.query.limit is not None or size < 1:
-            raise InvalidValue("a page has a size of at least 1, of a recollection by begin or id without limit")
-        found = list(self.store.find(replace(self.query, limit=size + 1, after=after or self.query.after)))
+        if isinstance(self.query.order, Nearest) or self.query.limit is not None:
+            raise InvalidValue("a page is one of a recollection by begin or id, without limit")
+        size = as_count(size, what="the size of a page", least=1, most=MOST_ID - 1)
+        behind = self.query.after if after is None else after
+        found = list(self.store.find(replace(self.query, limit=size + 1, after=behind)))
         events = tuple(found[:size])
         return Page(events=events, cursor=Cursor.after(events[-1]) if len(found) > size else None)
 
@@ -75,7 +96,8 @@ class Recollection:
         """Count, total duration, first begin and last end by type, agent, frame, UTC day or hour, or feature."""
         if self.query.limit is not None or self.query.after is not None or isinstance(self.query.order, Nearest):
             raise InvalidValue("groups are of all events that match: leave limit, cursor and nearest out")
-        key = by if isinstance(by, ByFeature) else named(by, Grouping, what="what to group by")
+        also = ", or elm.ByFeature(name=...) for the values of a feature"
+        key = by if isinstance(by, ByFeature) else named(by, Grouping, what="what to group by", also=also)
         return self.store.groups(self.query.cue, key)
 
     def latest_before(self, cue: Cue, *, same_region: bool = False) -> Iterator[tuple[StoredEvent, StoredEvent | None]]:
@@ -132,16 +154,16 @@ class Recollector:
         after: Cursor | None = None,
     ) -> Recollection:
         """The events that match `cue` (all without one), by (begin, id) unless another order is asked for."""
-        kind = order if isinstance(order, Nearest) else named(order, Order, what="the order of a recall")
-        query = Query(cue=And() if cue is None else cue, order=kind, limit=limit, after=after)
+        query = Query(cue=And() if cue is None else cue, order=as_order(order), limit=limit, after=after)
         return Recollection(self._store, query)
 
-    def get(self, name: UUID | int) -> StoredEvent:
-        """The event with this uid or id."""
-        if isinstance(name, UUID):
-            found = next(self._store.find(Query(cue=UidCue(uids=(name,)), limit=1)), None)
+    def get(self, name: UUID | str | int) -> StoredEvent:
+        """The event with this uid, which may be given as text, or this id."""
+        wanted = as_uid_or_id(name, what="the event to get")
+        if isinstance(wanted, UUID):
+            found = next(self._store.find(Query(cue=UidCue(uids=(wanted,)), limit=1)), None)
         else:
-            found = next(iter(self._store.get([name])), None)
+            found = next(iter(self._store.get([wanted])), None)
         if found is None:
             raise UnknownEvent(f"no event {name} in memory {self._store.memory!r}")
         return found

@@ -88,11 +88,15 @@ class Statistics:
     tombstones: int = 0
 
 
-class EventSink(Protocol):
-    """Where events go: all that an event source needs to know of a memory."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ForgettingCount:
+    """How many forgetting runs a memory has seen, and how many events it forgot in them without a tombstone of each.
 
-    def commit(self, event: Event) -> Committed:
-        """Keep one event."""
+    Every new run changes it, and every event that goes without leaving a tombstone.
+    """
+
+    runs: int
+    events: int
 
 
 class Store(Protocol):
@@ -136,11 +140,24 @@ class Store(Protocol):
     def run_tombstones(self) -> Iterator[RunTombstone]:
         """What is left of the rest of each forgetting, oldest first."""
 
+    def forgetting_count(self) -> ForgettingCount:
+        """How often this memory has forgotten, and how much; cheap enough to ask again and again."""
+
     def keep_tombstones(self, given: Sequence[Tombstone | RunTombstone]) -> BatchReport:
         """Keep tombstones of another memory; of an event that this one has, nothing is kept."""
 
     def find(self, query: Query) -> Iterator[StoredEvent]:
         """The events a query asks for, streamed from one consistent view."""
+
+    def with_parts(self, query: Query) -> Iterator[StoredEvent | Tombstone]:
+        """The events a query asks for and all they are made of, by id, after the tombstones of forgotten parts.
+
+        All are as of one moment, whatever is written or forgotten while they are read: each part comes before its
+        wholes, as an event or as a tombstone.
+        """
+
+    def everything(self) -> Iterator[StoredEvent | Tombstone | RunTombstone]:
+        """All that the memory holds, as of one moment: tombstones of forgettings, those of events, events by id."""
 
     def ids(self, query: Query) -> Iterator[int]:
         """Their ids alone."""

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import re
+
 from elm.errors import InvalidValue
 
 NAME_BYTES = 500
 """Longest name of a type, frame or agent, in bytes of UTF-8: an index entry holds it whole."""
+_MEMORY = re.compile(r"[A-Za-z][A-Za-z0-9_.-]{0,47}")
+_RESERVED = {"public", "information_schema", "topology", "tiger", "tiger_data"}
 
 
 def check_text(value: str, *, what: str) -> str:
@@ -41,3 +45,14 @@ def check_short_name(value: str, *, what: str) -> str:
     if len(value) > NAME_BYTES or (not value.isascii() and len(value.encode()) > NAME_BYTES):
         raise InvalidValue(f"{what} is longer than {NAME_BYTES} bytes: {value[:60]!r}... Shorten it")
     return value
+
+
+def check_memory_name(name: str) -> str:
+    """`name`, when a memory can be called that in every store: in a database it is the name of its schema."""
+    if not isinstance(name, str) or not _MEMORY.fullmatch(name):
+        raise InvalidValue(
+            f"a memory's name is up to 48 letters, digits, '_', '-' and '.', a letter first, not {name!r}"
+        )
+    if name.lower() in _RESERVED or name.lower().startswith("pg_"):
+        raise InvalidValue(f"{name!r} is a name that PostgreSQL keeps for itself: choose another")
+    return name

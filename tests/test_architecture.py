@@ -15,9 +15,10 @@ ROOT = Path(__file__).resolve().parents[1]
 LAYERS: tuple[tuple[str, ...], ...] = (
     # The domain.
     ("elm.errors",),
-    ("elm.text",),
+    ("elm.text", "elm.arguments", "elm.chunks", "elm.lines"),
     ("elm.interval", "elm.geometry", "elm.features", "elm.taxonomy", "elm.fields"),
     ("elm.event", "elm.tombstone"),
+    ("elm.extents",),
     ("elm.cues.relations",),
     ("elm.cues.algebra", "elm.exchange", "elm.columns", "elm.wordnet"),
     ("elm.cues.build", "elm.cues.codec", "elm.cues.match"),
@@ -26,7 +27,7 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("elm.query",),
     ("elm.store",),
     ("elm.log",),
-    ("elm.writer", "elm.recollector", "elm.recognizers", "elm.monitors"),
+    ("elm.writer", "elm.recollector", "elm.recognizers"),
     ("elm.loading", "elm.exporting", "elm.recognition", "elm.subscription"),
     ("elm.forgetting",),
     # The rooms that know SQL, and the wiring.
@@ -35,7 +36,8 @@ LAYERS: tuple[tuple[str, ...], ...] = (
     ("elm",),
     # The edges.
     ("elm.demo",),
-    ("elm.cli", "elm.server", "elm.viewer"),
+    ("elm.cli",),
+    ("elm.__main__",),
     # The bridge to ArmarX, a house of its own that stands on elm.
     ("armem_bridge.errors",),
     ("armem_bridge.moments",),

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import Field, fields, is_dataclass
+from datetime import datetime
 from enum import Enum
-from typing import Any, Final
+from typing import Any, Final, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 
@@ -30,8 +31,21 @@ from armem_bridge.aron.data import (
     NDArray,
     String,
 )
-from armem_bridge.aron.realization import Path, fits, name_of, parts_of, show_path
+from armem_bridge.aron.links import date_time_of
+from armem_bridge.aron.realization import Path, fits, name_of, parts_of, realizes, show_path
 from armem_bridge.errors import InvalidData, NotConvertible
+from armem_bridge.moments import InvalidMoment
+
+_Value = TypeVar("_Value")
+_Made = TypeVar("_Made")
+
+
+@runtime_checkable
+class Convertible(Protocol):
+    """What says by itself which data object it is."""
+
+    def to_aron(self) -> Data:
+        """The data object."""
 
 
 def to_aron(value: object, type_object: t.TypeObject | None = None) -> Data | None:
@@ -48,10 +62,12 @@ def to_aron(value: object, type_object: t.TypeObject | None = None) -> Data | No
     | list, tuple | List |
     | mapping with names as keys, dataclass | Dict |
     | np.ndarray | NDArray |
+    | what has a method `to_aron` (MemoryID) | what that says |
 
     An object type takes the members that there are, and None for a maybe member that is missing; what it
-    does not know is converted without it. Raises `NotConvertible` with the path of what has no ARON form
-    (bytes, sets, dates ...) or not the one asked for, `InvalidData` for what does not fit into its kind.
+    does not know is converted without it. Where it says DateTime, a datetime with its zone is one. Raises
+    `NotConvertible` with the path of what has no ARON form (bytes, sets, dates ...) or not the one asked for,
+    `InvalidData` with the path of what does not fit into its kind.
     """
     return _guided(value, type_object, ()) if type_object is not None else _plain(value, ())
 
@@ -101,28 +117,35 @@ def _comes_back(array: NDArray) -> bool:
 def _plain(value: Any, path: Path) -> Data | None:
     make = _MAKERS.get(type(value))
     if make is not None:
-        return make(value)
+        try:
+            return make(value)
+        except InvalidData as error:
+            raise _placed(error, path) from error
     if value is None or isinstance(value, Data):
         return value
     if len(path) > DEPTH_LIMIT:
         raise InvalidData(f"{_at(path)}lists and dicts nest deeper than {DEPTH_LIMIT} levels, or one holds itself")
     match value:
         case Mapping():
-            return Dict({_name(name, path): _plain(element, (*path, name)) for name, element in value.items()})
+            named = {_name(name, path): _plain(element, (*path, name)) for name, element in value.items()}
+            return _made(Dict, named, path)
         case list() | tuple():
-            return List([_plain(element, (*path, index)) for index, element in enumerate(value)])
+            return _made(List, [_plain(element, (*path, index)) for index, element in enumerate(value)], path)
         case np.ndarray():
-            return from_numpy(value)
+            return _made(from_numpy, value, path)
         case str():
-            return String(value)
+            return _made(String, value, path)
         case int() | np.integer():
-            return _integer(int(value))
+            return _made(_integer, int(value), path)
         case float():
             return Double(value)
         case Enum():
             return _plain(value.value, path)
         case _ if is_dataclass(value) and not isinstance(value, type):
-            return Dict({name: _plain(element, (*path, name)) for name, element in members_of(value).items()})
+            members = {name: _plain(element, (*path, name)) for name, element in members_of(value).items()}
+            return _made(Dict, members, path)
+        case Convertible() if not isinstance(value, type):
+            return value.to_aron()
         case _:
             raise NotConvertible(f"{_at(path)}a {type(value).__name__} has no ARON form: {_remedy(value)}")
 
@@ -138,38 +161,63 @@ def _guided(value: Any, type_object: t.TypeObject, path: Path) -> Data | None:
         case t.Any():
             return _plain(value, path)
         case t.String() if isinstance(value, str):
-            return String(value)
+            return _made(String, value, path)
         case t.Bool() if isinstance(value, bool | np.bool_):
             return Bool(bool(value))
-        case t.Int() | t.IntEnum() if _is_integer(value):
+        case t.Int() if _is_integer(value):
+            return _int(int(value), path)
+        case t.IntEnum() if _is_integer(value) and int(value) in type_object.numbers:
             return Int(int(value))
         case t.IntEnum() if isinstance(value, str) and value in type_object.values:
             return Int(type_object.values[value])
+        case t.IntEnum() if _is_integer(value) or isinstance(value, str):
+            known = ", ".join(f"{name} ({number})" for name, number in type_object.values.items())
+            raise NotConvertible(f"{_at(path)}{value!r:.80} is no {name_of(type_object)}: it has {known}")
         case t.Long() if _is_integer(value):
-            return Long(int(value))
+            return _made(Long, int(value), path)
         case t.Float() if _is_number(value):
-            return Float(_as_float(value))
+            return _made(Float, _as_float(value), path)
         case t.Double() if _is_number(value):
-            return Double(_as_float(value))
+            return _made(Double, _as_float(value), path)
         case t.NDArray() if isinstance(value, np.ndarray | np.generic | Sequence) and not isinstance(
             value, str | bytes
         ):
             return _array(value, type_object, path)
         case t.List() if _is_list(value):
-            return List([_guided(each, type_object.accepted, (*path, index)) for index, each in enumerate(value)])
+            accepted = type_object.accepted
+            elements = [_guided(each, accepted, (*path, index)) for index, each in enumerate(value)]
+            return _made(List, elements, path)
         case t.Tuple() | t.Pair() if _is_list(value):
             parts = parts_of(type_object)
             if len(value) != len(parts):
                 raise NotConvertible(f"{_at(path)}{len(value)} elements are not the {len(parts)} of its type")
             pairs = zip(value, parts, strict=True)
-            return List([_guided(each, part, (*path, index)) for index, (each, part) in enumerate(pairs)])
+            elements = [_guided(each, part, (*path, index)) for index, (each, part) in enumerate(pairs)]
+            return _made(List, elements, path)
         case t.Dict() if isinstance(value, Mapping):
             accepted = type_object.accepted
-            return Dict({_name(key, path): _guided(each, accepted, (*path, key)) for key, each in value.items()})
+            named = {_name(key, path): _guided(each, accepted, (*path, key)) for key, each in value.items()}
+            return _made(Dict, named, path)
         case t.Object() if isinstance(value, Mapping) or (is_dataclass(value) and not isinstance(value, type)):
             return _object(value, type_object, path)
+        case t.Object() if isinstance(value, datetime):
+            return _of_type(_made(date_time_of, value, path), value, type_object, path)
+        case _ if isinstance(value, Convertible) and not isinstance(value, type):
+            return _of_type(value.to_aron(), value, type_object, path)
         case _:
-            raise NotConvertible(f"{_at(path)}a {type(value).__name__} is no {name_of(type_object)}: {value!r:.80}")
+            raise _is_no(value, type_object, path)
+
+
+def _of_type(data: Data, value: object, type_object: t.TypeObject, path: Path) -> Data:
+    """The data that a value is by itself, where they have all that the type asks for."""
+    found = realizes(data, type_object)
+    if found.wrong or found.missing:
+        raise _is_no(value, type_object, path)
+    return data
+
+
+def _is_no(value: object, type_object: t.TypeObject, path: Path) -> NotConvertible:
+    return NotConvertible(f"{_at(path)}a {type(value).__name__} is no {name_of(type_object)}: {value!r:.80}")
 
 
 def _object(value: Any, type_object: t.Object, path: Path) -> Dict:
@@ -184,7 +232,7 @@ def _object(value: Any, type_object: t.Object, path: Path) -> Dict:
     for name, element in given.items():
         if name not in members:
             elements[_name(name, path)] = _plain(element, (*path, name))
-    return Dict(elements)
+    return _made(Dict, elements, path)
 
 
 def _array(value: Any, type_object: t.NDArray, path: Path) -> NDArray:
@@ -201,12 +249,33 @@ def _array(value: Any, type_object: t.NDArray, path: Path) -> NDArray:
         if not np.all(same):
             raise NotConvertible(f"{_at(path)}not all elements of type {array.dtype} fit into {type_object.element}")
         array = converted
-    made = from_numpy(array)
+    made = _made(from_numpy, array, path)
     if type_object.element and element_of(made) != element_name(type_object.element):
         raise NotConvertible(f"{_at(path)}elements of type {array.dtype} are no {type_object.element}")
     if type_object.shapes and not any(fits(extents_of(made), shape) for shape in type_object.shapes):
         raise NotConvertible(f"{_at(path)}an array of {list(array.shape)} is no {name_of(type_object)}")
     return made
+
+
+def _made(make: Callable[[_Value], _Made], value: _Value, path: Path) -> _Made:
+    """What `make` makes of a value; what cannot be made is refused with its path."""
+    try:
+        return make(value)
+    except (InvalidData, InvalidMoment, NotConvertible) as error:
+        raise _placed(error, path) from error
+
+
+def _placed(error: InvalidData | InvalidMoment | NotConvertible, path: Path) -> InvalidData | NotConvertible:
+    kind = InvalidData if isinstance(error, InvalidData) else NotConvertible
+    return kind(f"{_at(path)}{error}")
+
+
+def _int(value: int, path: Path) -> Int:
+    if not INT32[0] <= value <= INT32[1]:
+        raise InvalidData(
+            f"{_at(path)}{value} does not fit into 32 bits, and its type is Int: correct it, or have the type say Long"
+        )
+    return Int(value)
 
 
 def _integer(value: int) -> Int | Long:
@@ -260,4 +329,6 @@ def _remedy(value: object) -> str:
         return "give an array of uint8 (np.frombuffer(value, np.uint8))"
     if isinstance(value, set | frozenset):
         return "give a list"
+    if isinstance(value, datetime):
+        return "give microseconds since 1970, or a type that says DateTime there"
     return "give text, numbers, lists, dicts, arrays or dataclasses"

@@ -20,6 +20,7 @@ import armem_bridge.aron.type_objects as t
 from armem_bridge.aron.arrays import plain_dtype
 from armem_bridge.aron.class_names import Named, class_names, field_names, plain, value_names
 from armem_bridge.aron.data import NDArray
+from armem_bridge.aron.links import MICROSECONDS, unset_member
 from armem_bridge.aron.realization import parts_of
 from armem_bridge.aron.records import Record
 
@@ -39,7 +40,8 @@ def generate(*type_objects: t.TypeObject) -> dict[str, type]:
 
     `class_names` says how they are named. Members whose names are no identifiers of Python, or are taken,
     get `_` for each sign or after the name; in the data they keep theirs. An array begins with zeros, an
-    enumeration with its first value, a maybe type with None, Any with an empty dict.
+    enumeration with its first value, a maybe type with None, Any with an empty dict; a DateTime and the instance
+    of a MemoryID begin as not set (`aron.links`).
 
     Raises `InvalidTypeObject` when two different types would have one name.
     """
@@ -68,7 +70,7 @@ def _make(name: str, type_object: t.Object, made: dict[Named, Any]) -> type:
         (
             names[key],
             _annotation(member, made),
-            field(default_factory=_default(member, made), metadata={} if names[key] == key else {"aron": key}),
+            field(default_factory=_begin(type_object, key, made), metadata={} if names[key] == key else {"aron": key}),
         )
         for key, member in type_object.members.items()
     ]
@@ -96,6 +98,17 @@ def _annotation(type_object: t.TypeObject, made: dict[Named, Any]) -> Any:
         case _:
             inner = PRIMITIVES[type(type_object)]
     return inner | None if type_object.maybe else inner
+
+
+def _begin(owner: t.Object, key: str, made: dict[Named, Any]) -> Callable[[], Any]:
+    """What a field begins with."""
+    member = owner.members[key]
+    unset = unset_member(owner, key)
+    if unset is None:
+        return _default(member, made)
+    if isinstance(member, t.Object):
+        return partial(made[member], **{MICROSECONDS: unset})
+    return partial(int, unset)
 
 
 def _default(type_object: t.TypeObject, made: dict[Named, Any]) -> Callable[[], Any]:

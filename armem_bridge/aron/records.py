@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import types
 import typing
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, fields, is_dataclass
+from datetime import datetime
 from enum import Enum
 from functools import lru_cache
-from typing import Any, ClassVar, Self, TypeVar, get_args, get_origin
+from typing import Any, ClassVar, Protocol, Self, TypeVar, get_args, get_origin, runtime_checkable
 
 import numpy as np
 
@@ -16,10 +17,20 @@ import armem_bridge.aron.type_objects as t
 from armem_bridge.aron.arrays import to_numpy
 from armem_bridge.aron.conversion import member_name, to_aron, to_python
 from armem_bridge.aron.data import KINDS, Bool, Data, Dict, Double, Float, Int, List, Long, NDArray, String
+from armem_bridge.aron.links import date_time_from
 from armem_bridge.aron.realization import Path, show_path
-from armem_bridge.errors import InvalidTypeObject, NotConvertible, NotRealized
+from armem_bridge.errors import ArmemError, InvalidTypeObject, NotConvertible, NotRealized
 
 T = TypeVar("T")
+
+
+@runtime_checkable
+class Readable(Protocol):
+    """A class that reads its values by itself."""
+
+    def from_aron(self, data: Data | None) -> Any:
+        """The value of a data object."""
+
 
 _SCALARS: dict[Any, tuple[type[Data], ...]] = {
     bool: (Bool,),
@@ -39,8 +50,8 @@ def from_aron(data: Data | None, cls: type[T]) -> T:
     """`data` as a value of the dataclass `cls`; fields that the data lack keep their defaults, others are passed over.
 
     Fields may be of bool, int, float, str, numpy's scalars, np.ndarray, lists, tuples, dicts by str,
-    enumerations, dataclasses, data objects, Any, and each of them or None. A field's name in the data is its own or
-    `field(metadata={"aron": name})`.
+    enumerations, dataclasses, data objects, datetime (of a DateTime), MemoryID or another class with `from_aron`,
+    Any, and each of them or None. A field's name in the data is its own or `field(metadata={"aron": name})`.
 
     Raises `NotRealized` with the path where a member is of another kind, null where None is not allowed,
     or missing without a default; `NotConvertible` for an annotation that nothing can be read into.
@@ -102,11 +113,23 @@ def _read(data: Data | None, annotation: Any, path: Path) -> Any:
         inner = arguments[1] if arguments else Any
         items = _expect(data, (Dict,), annotation, path).elements.items()
         return {name: _read(element, inner, (*path, name)) for name, element in items}
+    if origin is datetime:
+        return _named(date_time_from, data, path)
     if isinstance(origin, type) and issubclass(origin, Enum):
         return _read_enum(data, origin, path)
     if is_dataclass(origin) and isinstance(origin, type):
         return _read_dataclass(_expect(data, (Dict,), annotation, path), origin, path)
+    if isinstance(origin, Readable):
+        return _named(origin.from_aron, data, path)
     raise NotConvertible(f"{show_path(path)}: nothing can be read into {_shown(annotation)}: annotate it otherwise")
+
+
+def _named(read: Callable[[Data | None], Any], data: Data | None, path: Path) -> Any:
+    """What a class reads by itself; what it refuses is refused with its path."""
+    try:
+        return read(data)
+    except ArmemError as error:
+        raise NotRealized(f"{show_path(path)}: {error}") from error
 
 
 def _read_dataclass(data: Dict, cls: type, path: Path) -> Any:

@@ -8,6 +8,7 @@ import armem_bridge.aron.type_objects as t
 from armem_bridge.aron.arrays import plain_dtype
 from armem_bridge.aron.class_names import Named, class_names, field_names, plain, value_names
 from armem_bridge.aron.generation import PRIMITIVES
+from armem_bridge.aron.links import MICROSECONDS, unset_member
 from armem_bridge.aron.realization import parts_of
 
 _HEAD: Final = '''"""Dataclasses of ARON type definitions, written by elm."""
@@ -64,7 +65,7 @@ def _dataclass(name: str, type_object: t.Object, names: dict[Named, str]) -> str
         metadata = "" if fields[key] == key else f", metadata={ {'aron': key}!r}"
         lines.append(
             f"    {fields[key]}: {_annotation(member, names)} = "
-            f"field(default_factory=lambda: {_default(member, names)}{metadata})"
+            f"field(default_factory=lambda: {_begin(type_object, key, names)}{metadata})"
         )
     members = ", ".join(f"{key!r}: {_expression(member, names)}" for key, member in type_object.members.items())
     extends = f", extends={base}.type_object" if type_object.extends is not None else ""
@@ -92,6 +93,14 @@ def _annotation(type_object: t.TypeObject, names: dict[Named, str]) -> str:
         case _:
             inner = PRIMITIVES[type(type_object)].__name__
     return f"{inner} | None" if type_object.maybe else inner
+
+
+def _begin(owner: t.Object, key: str, names: dict[Named, str]) -> str:
+    member = owner.members[key]
+    unset = unset_member(owner, key)
+    if unset is None:
+        return _default(member, names)
+    return f"{names[member]}({MICROSECONDS}={unset})" if isinstance(member, t.Object) else repr(unset)
 
 
 def _default(type_object: t.TypeObject, names: dict[Named, str]) -> str:

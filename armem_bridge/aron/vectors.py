@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -22,10 +22,8 @@ from armem_bridge.errors import LayoutMismatch
 
 Vector = npt.NDArray[np.float64]
 
-_NUMBERS: Final = (Int, Long, Float, Double)
 
-
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Place:
     """Where some numbers of a vector come from: a path, the kind of data object there, an array's shape and type."""
 
@@ -70,7 +68,7 @@ class Layout:
         raise LayoutMismatch(f"{what} {side} {place}: compare data of one type only")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Vectorized:
     """A data object as numbers: the vector, where its numbers come from, and what has none."""
 
@@ -92,7 +90,7 @@ def vectorize(data: Data | None) -> Vectorized:
     # The bytes of an array may be NaN of the signalling sort.
     with np.errstate(invalid="ignore"):
         vector = np.concatenate(chunks, dtype=np.float64, casting="unsafe") if chunks else np.empty(0)
-    return Vectorized(vector, Layout(tuple(places)), tuple(left_out))
+    return Vectorized(vector=vector, layout=Layout(tuple(places)), left_out=tuple(left_out))
 
 
 def stack(data: Iterable[Data | None]) -> tuple[npt.NDArray[np.float64], Layout]:
@@ -123,7 +121,7 @@ def devectorize(vector: Vector, layout: Layout, template: Data | None) -> Data |
 def _collect(data: Data | None, path: Path, places: list[Place], chunks: list[Any], left_out: list[Path]) -> None:
     match data:
         case Int() | Long() | Float() | Double():
-            places.append(Place(path, type(data).__name__))
+            places.append(Place(path=path, kind=type(data).__name__))
             chunks.append((data.value,))
         case Dict():
             for name in sorted(data.elements):
@@ -132,7 +130,7 @@ def _collect(data: Data | None, path: Path, places: list[Place], chunks: list[An
             for index, element in enumerate(data.elements):
                 _collect(element, (*path, index), places, chunks, left_out)
         case NDArray() if _is_numeric(data):
-            places.append(Place(path, "NDArray", data.shape, data.type))
+            places.append(Place(path=path, kind="NDArray", shape=data.shape, element=data.type))
             chunks.append(to_numpy(data).reshape(-1))
         case _:
             left_out.append(path)

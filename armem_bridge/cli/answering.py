@@ -48,11 +48,13 @@ class LongTerm:
     elm: Memory
 
     def memories(self) -> Sequence[str]:
+        """The names of the memories that snapshots were consolidated of."""
         from armem_bridge.long_term.contents import memory_names
 
         return memory_names(self.elm)
 
     def query(self, memory: str, query: Query) -> ArmemMemory:
+        """What was consolidated of the memory of that name and is asked for."""
         from armem_bridge.long_term.source import LongTermSource
         from armem_bridge.working.evaluation import evaluate
 
@@ -66,9 +68,11 @@ class Running:
     client: MemoryClient
 
     def memories(self) -> Sequence[str]:
+        """The names of the memories that the name system knows."""
         return list(self.client.registered())
 
     def query(self, memory: str, query: Query) -> ArmemMemory:
+        """What the running server answers. Raises `UnknownMemory` and what Ice has to say."""
         return self.client.memory(memory).query(query)
 
 

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import logging
-import signal
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from threading import Event as Signal
 from time import monotonic
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from elm.cli.stopping import set_by_signals, warnings_said
 from elm.cli.terminal import say
 
 if TYPE_CHECKING:
@@ -56,8 +54,8 @@ def serve(
 def _serve(config: Configuration) -> None:
     from armem_bridge.service import Service
 
-    service = Service(config)
-    with _warnings_said(), _set_by_signals() as stop:
+    service, stop = Service(config), Signal()
+    with warnings_said("elm", "armem_bridge"), set_by_signals(stop):
         service.start()
         try:
             say(f"serving {', '.join(service.servers)} at {service.address}")
@@ -110,41 +108,3 @@ def _described(config: Configuration) -> Iterator[str]:
     online, offline = len(config.online), len(config.offline)
     yield f"forgetting: {online} mechanisms online, {offline} offline"
     yield f"ice: {config.ice.mode}"
-
-
-@contextmanager
-def _set_by_signals() -> Iterator[Signal]:
-    """What SIGINT and SIGTERM set; a second one does what it does without elm."""
-    stop = Signal()
-
-    def ask(number: int, frame: Any) -> None:
-        stop.set()
-        for each in before:
-            signal.signal(each, signal.SIG_DFL)
-
-    before = {each: signal.signal(each, ask) for each in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield stop
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-
-
-class _Said(logging.Handler):
-    """What elm and the bridge warn of while they work, as a line on stderr."""
-
-    def emit(self, record: logging.LogRecord) -> None:
-        """Say it."""
-        say(f"elm: {record.getMessage()}")
-
-
-@contextmanager
-def _warnings_said() -> Iterator[None]:
-    handler, loggers = _Said(level=logging.WARNING), [logging.getLogger(name) for name in ("elm", "armem_bridge")]
-    for logger in loggers:
-        logger.addHandler(handler)
-    try:
-        yield
-    finally:
-        for logger in loggers:
-            logger.removeHandler(handler)

@@ -87,7 +87,7 @@ def _committed(server: Path, named: MemoryID, timeout: float | None) -> Iterator
 
     heard: SimpleQueue[Sequence[MemoryID]] = SimpleQueue()
     with connected(server) as client:
-        memories = [named.memory] if named.memory else list(client.registered())
+        memories = [client.memory(named.memory).name] if named.memory else list(client.registered())
         for memory in memories:
             client.listen(memory, heard.put, named)
         say(f"watching {str(named) or 'everything'} in {', '.join(memories)}")

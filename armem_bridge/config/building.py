@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -28,10 +28,11 @@ from armem_bridge.config.values import (
     RobotStateConfig,
 )
 from armem_bridge.long_term.poses import PosePath
+from armem_bridge.long_term.robot_place import check_footprint
 from armem_bridge.long_term.settings import Consolidation, When
 from armem_bridge.memory_id import Level, MemoryID
 from armem_bridge.profiles import PROFILES, Profile
-from armem_bridge.working.limits import HistoryLimits
+from armem_bridge.working.limits import UNLIMITED, HistoryLimits
 from armem_bridge.working.segments import CoreSegmentDefinition
 
 LONGEST: Final = 1e9
@@ -60,6 +61,11 @@ def read_config(file: Path | str) -> Configuration:
     long_term = None
     if tables.long_term is not None:
         long_term = _long_term(tables.long_term, tables, memories, place / "long_term")
+        if long_term.settings.when is When.ON_EVICTION and not any(map(_is_limited, memories)):
+            (place / "long_term.when").refuse(
+                "consolidates what leaves working memory, and nothing ever does, for no history has a limit: "
+                'set history in [[memories]], or when = "on_commit"'
+            )
     if online and (long_term is None or long_term.settings.when is not When.ON_EVICTION):
         (place / "forgetting.online").refuse(
             'says what of that which leaves working memory is kept: set when = "on_eviction" in [long_term]'
@@ -82,10 +88,11 @@ def _memory(table: MemoryTable, at: Place) -> MemoryConfig:
         at.refuse('has neither a name nor a profile: give one, for example profile = "ObjectMemory"')
     with (at / "name").said():
         memory = MemoryID(memory=name)
+    core_segments = _core_segments(table, profile, at)
     return MemoryConfig(
         name=name,
-        core_segments=_core_segments(table, profile, at),
-        limits=_limits(table, memory, at),
+        core_segments=core_segments,
+        limits=_limits(table, memory, {segment.name for segment in core_segments}, at),
         prior_knowledge=tuple((at / "prior_knowledge").path(each) for each in table.prior_knowledge),
         delay_threshold=_microseconds(table.delay_warning, at / "delay_warning"),
         update_bytes=table.update_bytes,
@@ -123,22 +130,33 @@ def _core_segments(table: MemoryTable, profile: Profile | None, at: Place) -> tu
     return tuple(found.values())
 
 
-def _limits(table: MemoryTable, memory: MemoryID, at: Place) -> dict[MemoryID, int]:
+def _limits(table: MemoryTable, memory: MemoryID, names: Collection[str], at: Place) -> dict[MemoryID, int]:
     limits: dict[MemoryID, int] = {}
     if table.history is not None:
         limits[memory] = table.history
-    for segment in table.core_segments:
-        if segment.history is not None:
-            limits[memory.with_core_segment(segment.name)] = segment.history
-    with (at / "history_limits").said():
-        for path, limit in table.history_limits.items():
-            where = MemoryID.parse(f"{memory}/{path}")
-            if where in limits:
-                (at / "history_limits").refuse(f"the limit of {path!r:.80} is there twice: drop one")
-            limits[where] = limit
     with (at / "history").said():
         HistoryLimits(limits)
+    for number, segment in enumerate(table.core_segments):
+        if segment.history is not None:
+            where = memory.with_core_segment(segment.name)
+            with (at / named("core_segments", segment.name, number) / "history").said():
+                HistoryLimits({where: segment.history})
+            limits[where] = segment.history
+    for path, limit in table.history_limits.items():
+        place = at / f'history_limits "{path}"'
+        with place.said():
+            where = MemoryID.parse(f"{memory}/{path}")
+            HistoryLimits({where: limit})
+        if where.core_segment not in names:
+            place.refuse(f"there is no core segment {where.core_segment!r:.80}: add it, or correct this")
+        if where in limits:
+            place.refuse("the limit is there twice: drop one")
+        limits[where] = limit
     return limits
+
+
+def _is_limited(memory: MemoryConfig) -> bool:
+    return any(limit != UNLIMITED for limit in memory.limits.values())
 
 
 def _long_term(table: LongTermTable, file: FileTable, memories: Sequence[MemoryConfig], at: Place) -> LongTermConfig:
@@ -165,6 +183,7 @@ def _settings(table: LongTermTable, at: Place) -> Consolidation:
     with at.said():
         return Consolidation(
             when=table.when,
+            at_stop=table.at_stop,
             durable=table.durable,
             **{name: value for name, value in given.items() if value is not None},
         )
@@ -195,6 +214,9 @@ def _robot_state(table: RobotStateTable | None, memories: Sequence[MemoryConfig]
         (at / "segment").refuse(f"there is no core segment {segment.cut(Level.CORE_SEGMENT)}: add it, or correct this")
     with (at / "pose").said():
         pose = PosePath.at(table.pose, unit=table.unit, segment=segment)
+    if table.footprint is not None:
+        with (at / "footprint").said():
+            check_footprint(table.footprint)
     return RobotStateConfig(
         pose=pose,
         footprint=tuple(table.footprint) if isinstance(table.footprint, list) else table.footprint,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import assert_never
 
 from armem_bridge.config.refusals import Place
@@ -28,12 +29,7 @@ from armem_bridge.forgetting.mechanisms import (
 
 def online_mechanisms(table: OnlineTable, at: Place) -> tuple[Online, ...]:
     """The mechanisms of `[forgetting.online]`."""
-    found: list[Online] = []
-    if table.time_decay is not None:
-        found.append(_time_decay(table.time_decay, at / "time_decay"))
-    if table.frequency is not None:
-        with (at / "frequency").said():
-            found.append(Frequency(wait=table.frequency.wait))
+    found: list[Online] = [*_shared(table, at)]
     if table.similarity is not None:
         found.append(_similarity(table.similarity, at / "similarity"))
     return tuple(found)
@@ -41,17 +37,21 @@ def online_mechanisms(table: OnlineTable, at: Place) -> tuple[Online, ...]:
 
 def offline_mechanisms(table: OfflineTable, at: Place) -> tuple[Offline, ...]:
     """The mechanisms of `[forgetting.offline]`."""
-    found: list[Offline] = []
-    if table.time_decay is not None:
-        found.append(_time_decay(table.time_decay, at / "time_decay"))
-    if table.frequency is not None:
-        with (at / "frequency").said():
-            found.append(Frequency(wait=table.frequency.wait))
+    found: list[Offline] = [*_shared(table, at)]
     if table.similarity is not None:
         found.append(_latent_similarity(table.similarity, at / "similarity"))
     if table.retention is not None:
         found.append(_retention(table.retention, at / "retention"))
     return tuple(found)
+
+
+def _shared(table: OnlineTable | OfflineTable, at: Place) -> Iterator[TimeDecay | Frequency]:
+    """What forgets by itself, online and offline alike."""
+    if table.time_decay is not None:
+        yield _time_decay(table.time_decay, at / "time_decay")
+    if table.frequency is not None:
+        with (at / "frequency").said():
+            yield Frequency(wait=table.frequency.wait)
 
 
 def _time_decay(table: TimeDecayTable, at: Place) -> TimeDecay:

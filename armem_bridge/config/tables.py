@@ -6,8 +6,10 @@ from typing import Literal
 
 import msgspec
 
-from armem_bridge.config.values import Mode
+from armem_bridge.config.values import PORT, Mode
 from armem_bridge.long_term.settings import When
+from armem_bridge.working.server import DELAY_THRESHOLD, UPDATE_BYTES
+from elm.geometry import DEFAULT_FRAME
 
 
 class Table(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -51,8 +53,8 @@ class MemoryTable(Table, frozen=True):
     history_limits: dict[str, int] = {}
     core_segments: list[CoreSegmentTable] = []
     prior_knowledge: list[str] = []
-    delay_warning: float = 1.0
-    update_bytes: int = 256 * 1024 * 1024
+    delay_warning: float = DELAY_THRESHOLD / 1_000_000
+    update_bytes: int = UPDATE_BYTES
 
 
 class RobotStateTable(Table, frozen=True):
@@ -71,9 +73,10 @@ class LongTermTable(Table, frozen=True):
     memory: str = "elm"
     dsn: str | None = None
     robot: str = ""
-    frame: str = "map"
+    frame: str = DEFAULT_FRAME
     radius: float | None = None
     when: When = When.ON_COMMIT
+    at_stop: bool = True
     durable: bool = False
     backlog: int | None = None
     backlog_bytes: int | None = None
@@ -88,7 +91,7 @@ class IceTable(Table, frozen=True):
     mode: Mode
     slices: list[str] = []
     host: str = "127.0.0.1"
-    port: int = 4061
+    port: int = PORT
     endpoint: str = "tcp"
     locator: str = ""
     own_name_system: bool = False
@@ -121,7 +124,7 @@ class SimilarityTable(Table, frozen=True):
 
 
 class LatentSimilarityTable(SimilarityTable, frozen=True):
-    """The same for offline forgetting, with an encoder if wanted."""
+    """`[forgetting.offline] similarity`: the same, with an encoder if wanted."""
 
     encoder: Literal["none", "pca", "random_projection"] = "none"
     size: int | None = None
@@ -164,7 +167,7 @@ class ForgettingTable(Table, frozen=True):
 
 
 class FileTable(Table, frozen=True):
-    """The whole file."""
+    """The whole file: what stands at `the top of the file`."""
 
     memories: list[MemoryTable] = []
     long_term: LongTermTable | None = None

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from enum import StrEnum
 from pathlib import Path
+from typing import Final
 
 import msgspec
 
@@ -13,6 +14,9 @@ from armem_bridge.long_term.poses import PosePath
 from armem_bridge.long_term.settings import Consolidation
 from armem_bridge.memory_id import MemoryID
 from armem_bridge.working.segments import CoreSegmentDefinition
+
+PORT: Final = 4061
+"""Where clients of ArmarX look for the registry unless they are told otherwise."""
 
 
 class Mode(StrEnum):

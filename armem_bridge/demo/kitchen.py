@@ -92,6 +92,7 @@ class KitchenClock:
         self._now = moment(0)
 
     def __call__(self) -> int:
+        """What time it is: when the last commit arrived."""
         return self._now
 
     def receive(self, commit: Commit) -> Commit:

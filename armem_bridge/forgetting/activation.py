@@ -29,10 +29,11 @@ class Exponential:
         require_number(self.tau, what="the time constant tau of an activation, in seconds,", open_=True)
 
     def __call__(self, seconds: float) -> float:
+        """The activation so many seconds after the last use."""
         return math.exp(-max(seconds, 0.0) / self.tau)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Ebbinghaus:
     """Ebbinghaus's own curve of 1885, k / ((log10 t)^c + k), as Murre and Dros (2015) quote it.
 
@@ -52,5 +53,6 @@ class Ebbinghaus:
         require_number(self.minute, what="the minute of Ebbinghaus's curve, in seconds,", open_=True)
 
     def __call__(self, seconds: float) -> float:
+        """The activation so many seconds after the last use."""
         minutes = 1.0 + max(seconds, 0.0) / self.minute
         return self.k / (math.pow(math.log10(minutes), self.c) + self.k)

@@ -22,7 +22,7 @@ Distance = Callable[[Matrix, Vector], Vector]
 """From each row of a matrix to a vector: 0 for what is the same, never negative, never NaN; see `DISTANCES`."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Compared:
     """What of a snapshot is compared: the numbers of its data, where they are from, and what is no number.
 

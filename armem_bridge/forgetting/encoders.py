@@ -35,7 +35,7 @@ class Encoder(Protocol):
         """The encoding learned from vectors, one a row. Raises `InvalidEncoder` unless they are finite numbers."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Linear:
     """A linear encoding about the mean of the vectors that it was learned from."""
 
@@ -48,12 +48,15 @@ class Linear:
 
     @property
     def size(self) -> int:
+        """How many numbers a code has."""
         return int(self.encoding.shape[1])
 
     def encode(self, vectors: Matrix) -> Matrix:
+        """The codes of vectors, one a row. Raises `InvalidEncoder` for rows of another width."""
         return np.asarray((_checked(vectors, self.encoding.shape[0]) - self.mean) @ self.encoding)
 
     def decode(self, codes: Matrix) -> Matrix:
+        """Vectors that have about these codes. Raises `InvalidEncoder` for rows of another width."""
         return np.asarray(_checked(codes, self.size) @ self.decoding + self.mean)
 
 
@@ -70,6 +73,7 @@ class PCA:
         _require_size(self.size)
 
     def fit(self, vectors: Matrix) -> Linear:
+        """The encoding by the principal components of vectors, one a row. Raises `InvalidEncoder`."""
         vectors = _learned_from(vectors)
         mean = vectors.mean(axis=0, keepdims=True)
         _, strengths, directions = np.linalg.svd(vectors - mean, full_matrices=False)
@@ -98,6 +102,7 @@ class RandomProjection:
             raise InvalidEncoder(f"the seed of a random projection is an integer from 0 on, not {self.seed!r:.80}")
 
     def fit(self, vectors: Matrix) -> Linear:
+        """The encoding by random directions about the mean of vectors, one a row. Raises `InvalidEncoder`."""
         vectors = _learned_from(vectors)
         width = vectors.shape[1]
         size = min(self.size, width)

@@ -32,7 +32,7 @@ class TimeDecay:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Frequency:
-    """Keeps at most one snapshot of an entity in `wait` seconds: `wait` <= time between it and the one kept before it.
+    """Keeps at most one snapshot of an entity in `wait` seconds: `wait` <= time between it and the nearest one kept.
 
     Times are reference times: when something is consolidated does not matter, for much may be at once.
     """
@@ -45,7 +45,7 @@ class Frequency:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Similarity:
-    """Keeps what is new: `minimum` <= its distance from the last `count` that were kept (d_min and n).
+    """Keeps what is new: `minimum` <= its distance from the last `count` kept before its reference time (d_min and n).
 
     What has no numbers, or cannot be compared with one of them, is infinitely far, and kept.
     """

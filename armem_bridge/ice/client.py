@@ -4,27 +4,34 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from threading import Lock
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 from armem_bridge.ice.communicators import make_communicator, servant_of
 from armem_bridge.ice.edge import NAME_SYSTEM, topic_of
 from armem_bridge.ice.grid import Grid
 from armem_bridge.ice.installation import load_ice
 from armem_bridge.ice.making import maker
+from armem_bridge.ice.parting import part
 from armem_bridge.ice.refusals import RemoteFailure, Unreachable
 from armem_bridge.ice.vocabulary import Vocabulary
 from armem_bridge.ice.wire import Wire
 from armem_bridge.memory_id import MemoryID
+from armem_bridge.moments import NOT_SET, now
 from armem_bridge.names import UnknownMemory
-from armem_bridge.working.commit import Commit, CommitResult
-from armem_bridge.working.notifications import Listener
-from armem_bridge.working.query import Query
+from armem_bridge.working.admission import check_commit, check_wishes
+from armem_bridge.working.commit import Commit, CommitResult, UpdateResult
+from armem_bridge.working.evaluation import selects
+from armem_bridge.working.notifications import Listener, check_listener
+from armem_bridge.working.query import Query, check_query
 from armem_bridge.working.segments import AddSegment, SegmentResult
 from armem_bridge.working.tree import Memory
 
 _EVERYTHING = MemoryID()
+_Given = TypeVar("_Given")
+_Result = TypeVar("_Result")
 _logger = logging.getLogger(__name__)
 
 
@@ -42,18 +49,54 @@ class RemoteMemory:
         self._not_understood = (ice.UnknownLocalException, ice.MarshalException)
 
     def add_segments(self, wishes: Sequence[AddSegment]) -> tuple[SegmentResult, ...]:
-        """Add provider segments; one result for each wish, in their order."""
+        """Add provider segments; one result for each wish, in their order.
+
+        A wish that cannot be sent is refused by itself: types of segments do not travel.
+        """
+        check_wishes(wishes)
         commits = self._wire.commits
-        return commits.read_segment_results(self._ask(self.writing.addSegments, commits.write_segments(wishes)))
+        refused = _refused(wishes, commits.why_no_wish)
+        sendable = [wish for place, wish in enumerate(wishes) if place not in refused]
+        made = commits.read_segment_results(self._ask(self.writing.addSegments, commits.write_segments(sendable)))
+        failed = {place: SegmentResult(success=False, error=why) for place, why in refused.items()}
+        return tuple(self._in_order(failed, made, len(wishes)))
 
     def commit(self, commit: Commit) -> CommitResult:
-        """Make the updates of a commit; one result for each, in their order."""
-        commits = self._wire.commits
-        return commits.read_result(self._ask(self.writing.commit, commits.write_commit(commit)))
+        """Make the updates of a commit; one result for each, in their order.
+
+        An update that cannot be sent is refused by itself, and never arrives. Those that do not say when they
+        were sent are sent now.
+        """
+        check_commit(commit)
+        commits, updates = self._wire.commits, commit.updates
+        refused = _refused(updates, commits.why_unsendable)
+        if refused:
+            commit = Commit(updates=[update for place, update in enumerate(updates) if place not in refused])
+        made = commits.read_result(self._ask(self.writing.commit, commits.write_commit(commit, sent=now())))
+        if not refused:
+            return made
+        failed = {place: UpdateResult(success=False, error=why, arrived=NOT_SET) for place, why in refused.items()}
+        return CommitResult(results=tuple(self._in_order(failed, made.results, len(updates))))
 
     def query(self, query: Query) -> Memory:
-        """What the memory has of what a query asks for. Raises `RemoteFailure` where it refuses, `NotExpressible`."""
-        return self._wire.results.read(self._ask(self.reading.query, self._wire.queries.write(query)))
+        """What the memory has of what a query asks for; of what it asks other memories for, nothing.
+
+        Raises `InvalidQuery` for what is none, `RemoteFailure` where the memory refuses it, `NotExpressible`.
+        """
+        check_query(query)
+        mine = [each for each in query.memories if selects(each.names, self.name)]
+        asked = Query(memories=mine, target=query.target, with_data=query.with_data)
+        return self._wire.results.read(self._ask(self.reading.query, self._wire.queries.write(asked)))
+
+    def _in_order(self, refused: Mapping[int, _Result], made: Sequence[_Result], count: int) -> list[_Result]:
+        """What became of all, in the order in which they were given."""
+        if len(refused) + len(made) != count:
+            raise RemoteFailure(
+                f"the memory {self.name!r:.80} answers with {len(made)} results where {count - len(refused)} were "
+                f"asked for: look at what it has of them, for which are which cannot be told"
+            )
+        others = iter(made)
+        return [refused[place] if place in refused else next(others) for place in range(count)]
 
     def _ask(self, operation: Callable[[Any], Any], wire: Any) -> Any:
         try:
@@ -64,6 +107,11 @@ class RemoteMemory:
                 f"({getattr(error, 'unknown', '') or type(error).__name__}): they have loaded slice files of different "
                 f"generations, or the data nest too deep. Load the files that the server has"
             ) from error
+
+
+def _refused(given: Sequence[_Given], why: Callable[[_Given], str]) -> dict[int, str]:
+    """The places of those that cannot be sent, with the reasons."""
+    return {place: reason for place, each in enumerate(given) if (reason := why(each))}
 
 
 class MemoryClient:
@@ -134,13 +182,23 @@ class MemoryClient:
         return self._memory(name, answer.server)
 
     def listen(self, memory: str, listener: Listener, subscribed: MemoryID = _EVERYTHING) -> None:
-        """Call `listener` with the IDs of updated snapshots that `subscribed` contains, in a thread of Ice."""
+        """Call `listener` with the IDs of updated snapshots that `subscribed` contains, in a thread of Ice.
+
+        Where it raises, that is logged, and it is called again the next time. Raises `InvalidSubscription`
+        for an ID that is none.
+        """
+        check_listener(listener, subscribed)
         read = self.wire.identifiers.read_id
 
         def updated(wires: Sequence[Any], current: Any) -> None:
             found = tuple(each for each in map(read, wires) if subscribed.contains(each))
-            if found:
+            if not found:
+                return
+            try:
                 listener(found)
+            except Exception:
+                # Nobody who publishes may be told of it, and the next message is for the listener all the same.
+                _logger.exception("a listener to %s in the memory %s raised", subscribed, memory)
 
         interface = self._words.member(self._words.client, "MemoryListenerInterface")
         topic = self._grid.topic(topic_of(memory))
@@ -150,12 +208,11 @@ class MemoryClient:
 
     def close(self) -> None:
         """End all subscriptions and connections."""
-        ice = load_ice()
         try:
-            for topic, proxy in self._subscriptions:
-                topic.unsubscribe(proxy)
-        except ice.LocalException as error:
-            _logger.info("a topic was not told that its subscriber left: %s", error)
+            part(
+                (f"unsubscribing from {topic}", partial(topic.unsubscribe, proxy))
+                for topic, proxy in self._subscriptions
+            )
         finally:
             self.communicator.destroy()
 

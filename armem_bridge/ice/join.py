@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterable, Mapping
+from functools import partial
 from typing import Any
 
 from armem_bridge.ice.edge import NAME_SYSTEM, Edge, topic_of
 from armem_bridge.ice.grid import Grid
 from armem_bridge.ice.making import maker
+from armem_bridge.ice.parting import part
 from armem_bridge.ice.refusals import RemoteFailure, Unreachable
 from armem_bridge.ice.vocabulary import Vocabulary
 from armem_bridge.names import MemoryNameSystem
@@ -86,10 +88,14 @@ class Joined(Edge):
 
     def _leave(self) -> None:
         """Unregister everything, as far as the robot is still there."""
-        try:
-            for name in self._named:
-                self._names.unregisterServer(self._unregister(name=name))
-            for proxy in self._registered:
-                self._grid.unregister(proxy)
-        except Exception as error:
-            _logger.warning("the robot was not told that the memories %s left: %s", ", ".join(self._named), error)
+        named = [
+            (f"unregistering {name} from the name system", partial(self._leave_names, name)) for name in self._named
+        ]
+        registered = [
+            (f"unregistering {proxy} from the registry", partial(self._grid.unregister, proxy))
+            for proxy in self._registered
+        ]
+        part([*named, *registered])
+
+    def _leave_names(self, name: str) -> None:
+        self._names.unregisterServer(self._unregister(name=name))

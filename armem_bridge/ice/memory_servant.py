@@ -67,9 +67,12 @@ class MemoryServant:
 
     def commit(self, wire: Any, current: Any) -> Any:
         """WritingMemoryInterface.commit."""
+        if wire is None:
+            self._note_malformed()
+            return self._commits.write_result(self._all_failed(1, "the commit is null: send one with its updates"))
         updates = wire.updates
         try:
-            results = self._commit(updates)
+            results = self._commit(updates, current)
         except ArmemError as error:
             results = self._all_failed(len(updates), str(error))
         except Exception as error:
@@ -89,8 +92,8 @@ class MemoryServant:
             results = tuple(SegmentResult(success=False, error=why) for _ in wires)
         return self._commits.write_segment_results(results)
 
-    def _commit(self, wires: Sequence[Any]) -> Sequence[UpdateResult]:
-        outcomes = [self._read_update(wire) for wire in wires]
+    def _commit(self, wires: Sequence[Any], current: Any) -> Sequence[UpdateResult]:
+        outcomes = [self._read_update(wire, current) for wire in wires]
         updates = tuple([each for each in outcomes if type(each) is EntityUpdate])
         results = self.server.commit(Commit(updates=updates)).results
         if len(updates) == len(outcomes):
@@ -101,13 +104,19 @@ class MemoryServant:
             for each in outcomes
         ]
 
-    def _read_update(self, wire: Any) -> EntityUpdate | str:
+    def _read_update(self, wire: Any, current: Any) -> EntityUpdate | str:
         """The update, or why it cannot be one."""
+        if wire is None:
+            self._note_malformed()
+            return "the update cannot be read: it is null"
         try:
             update = self._commits.read_update(wire)
         except ArmemError as error:
             self._note_malformed()
             return f"the update cannot be read: {error}"
+        except Exception as error:
+            self._note_malformed()
+            return self._unexpected("an update", error, current)
         return update if update.referenced >= 0 else self._timed(update)
 
     def _timed(self, update: EntityUpdate) -> EntityUpdate:

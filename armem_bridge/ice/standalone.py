@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterable, Mapping
 from threading import Lock
-from typing import Any, Final
+from typing import Any
 
 from armem_bridge.ice.edge import Edge, topic_of
 from armem_bridge.ice.registry import Registry
@@ -13,9 +13,6 @@ from armem_bridge.ice.topics import Topics
 from armem_bridge.ice.vocabulary import Vocabulary
 from armem_bridge.names import MemoryNameSystem
 from armem_bridge.working.server import MemoryServer
-
-PORT: Final = 4061
-"""Where clients of ArmarX look for the registry unless they are told otherwise."""
 
 _logger = logging.getLogger(__name__)
 
@@ -33,7 +30,7 @@ class Standalone(Edge):
         servers: Iterable[MemoryServer] = (),
         *,
         host: str = "127.0.0.1",
-        port: int = PORT,
+        port: int,
         properties: Mapping[str, str] | None = None,
     ) -> None:
         super().__init__(words, endpoint=f"tcp -h {host} -p {port}", properties=properties)

@@ -13,8 +13,8 @@ from armem_bridge.long_term.catalogue import names_below
 from armem_bridge.long_term.listed_history import ListedHistory
 from armem_bridge.long_term.refusals import ArchiveClosed, BacklogFull
 from armem_bridge.memory_id import MemoryID
-from armem_bridge.working.access_statistics import Usage
 from armem_bridge.working.admission import size_of
+from armem_bridge.working.archive import Evicted
 from armem_bridge.working.history import History
 from armem_bridge.working.snapshot import Snapshot
 
@@ -27,8 +27,8 @@ class Waiting:
     aron_type: TypeObject | None
     """The type of its segment when it came."""
 
-    evicted: Usage | None = None
-    """How it was used before it left working memory; None for what was just committed."""
+    evicted: Evicted | None = None
+    """How it left working memory, until it is decided that it is kept; None for what was just committed."""
 
     moment: int = 0
     """When it was handed over, by the clock of the archive."""
@@ -160,31 +160,47 @@ class Backlog:
         """What waits, as a memory."""
         return BacklogSource(self)
 
-    def entities(self) -> list[MemoryID]:
-        """The entities that something waits of."""
-        with self._changed:
-            return list(self._entities)
+    def let_in(self) -> BacklogSource:
+        """What only waits to be written, as a memory: it is decided that it is kept."""
+        return BacklogSource(self, decided=True)
 
-    def versions(self, entity: MemoryID) -> list[Snapshot]:
-        """What waits of an entity."""
+    def entities(self, *, decided: bool = False) -> list[MemoryID]:
+        """The entities that something waits of; with `decided` only of what is kept in any case."""
         with self._changed:
-            return [each.snapshot for each in self._entities.get(entity, {}).values()]
+            if not decided:
+                return list(self._entities)
+            return [
+                entity
+                for entity, waiting in self._entities.items()
+                if any(each.evicted is None for each in waiting.values())
+            ]
+
+    def versions(self, entity: MemoryID, *, decided: bool = False) -> list[Snapshot]:
+        """What waits of an entity; with `decided` only what is kept in any case."""
+        with self._changed:
+            waiting = self._entities.get(entity, {}).values()
+            return [each.snapshot for each in waiting if not decided or each.evicted is None]
 
 
 class BacklogSource:
     """A `Source` over what waits in a backlog at the moment of each question."""
 
-    def __init__(self, backlog: Backlog) -> None:
+    def __init__(self, backlog: Backlog, *, decided: bool = False) -> None:
         self._backlog = backlog
+        self._decided = decided
 
     def names(self, parent: MemoryID) -> Sequence[str]:
-        return names_below(parent, self._backlog.entities())
+        """The names one level below `parent` that something waits of, in order."""
+        return names_below(parent, self._backlog.entities(decided=self._decided))
 
     def knows(self, name: MemoryID) -> bool:
-        return any(map(name.contains, self._backlog.entities()))
+        """Whether something waits of this or of what is below it."""
+        return any(map(name.contains, self._backlog.entities(decided=self._decided)))
 
     def segment_type(self, segment: MemoryID) -> TypeObject | None:
+        """None: types are not kept."""
         return None
 
     def history(self, entity: MemoryID) -> History:
-        return ListedHistory(self._backlog.versions(entity))
+        """What waits of an entity now; what comes later is not in it."""
+        return ListedHistory(self._backlog.versions(entity, decided=self._decided))

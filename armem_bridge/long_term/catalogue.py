@@ -12,6 +12,7 @@ from armem_bridge.memory_id import InvalidMemoryID, Level, MemoryID
 from elm.app import Memory
 from elm.errors import MemoryMissing
 from elm.query import ByFeature
+from elm.store import ForgettingCount
 
 MAX_AGE: Final = 300.0
 """After so many seconds the names are looked up again, for other processes may have written some."""
@@ -40,7 +41,7 @@ class Catalogue:
         self._entities: set[MemoryID] = set()
         self._written: set[MemoryID] = set()
         self._known_at: float | None = None
-        self._forgotten: tuple[int, int] = (0, 0)
+        self._forgotten = ForgettingCount(runs=0, events=0)
 
     def add(self, entities: Iterable[MemoryID]) -> None:
         """There are snapshots of these now."""
@@ -71,13 +72,11 @@ class Catalogue:
             return set()
         return {found for group in groups if (found := _entity(group.key)) is not None}
 
-    def _forgotten_so_far(self) -> tuple[int, int]:
-        """What changes with every forgetting: how many there were, and of how many events."""
+    def _forgotten_so_far(self) -> ForgettingCount:
         try:
-            runs = list(self._memory.store.run_tombstones())
+            return self._memory.store.forgetting_count()
         except MemoryMissing:
-            return (0, 0)
-        return len(runs), sum(run.events for run in runs)
+            return ForgettingCount(runs=0, events=0)
 
 
 def _entity(text: object) -> MemoryID | None:

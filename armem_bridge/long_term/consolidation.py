@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import logging
 import time
-from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from threading import Lock, Thread
 from types import TracebackType
 from typing import Final, Self
 
 from armem_bridge.aron.type_objects import TypeObject
 from armem_bridge.long_term.backlog import Backlog, Waiting
+from armem_bridge.long_term.backlog_worker import BacklogWorker
 from armem_bridge.long_term.catalogue import Catalogue
 from armem_bridge.long_term.event_types import SegmentTypes, types_of
-from armem_bridge.long_term.gate import Gate, OpenGate, RememberingGate
+from armem_bridge.long_term.gate import Gate
 from armem_bridge.long_term.health import Health
 from armem_bridge.long_term.refusals import ArchiveClosed, NotConsolidated
 from armem_bridge.long_term.robot_place import LocationPort, PoseListener
@@ -24,7 +22,6 @@ from armem_bridge.long_term.subjects import SubjectFinder
 from armem_bridge.long_term.writing import UNAVAILABLE, EventWriter, SetAside
 from armem_bridge.memory_id import Level
 from armem_bridge.moments import Clock, now
-from armem_bridge.working.access_statistics import Usage
 from armem_bridge.working.archive import Evicted, NotKept
 from armem_bridge.working.history import Source
 from armem_bridge.working.server import MemoryServer
@@ -34,21 +31,13 @@ from elm.app import Memory
 from elm.errors import StoreFailure
 from elm.text import check_short_name
 
-SHOWN: Final = 100
-"""So many of the snapshots that were set aside are kept to be looked at."""
-
-GLANCE: Final = 0.02
-"""So many seconds pass between two looks at snapshots that wait for poses of the robot."""
-
 STOP_TIMEOUT: Final = 30.0
-"""So many seconds `close` waits for what still waits to be consolidated, unless told otherwise."""
+"""So many seconds `close` waits for anything of what still waits to become durable, unless told otherwise."""
 
 _BEYOND: Final = (
     "its reference time is beyond the year 9999, where long-term memory has no times: "
     "give the time that the data are about, in microseconds since 1970"
 )
-
-_logger = logging.getLogger(__name__)
 
 
 class LongTermMemory:
@@ -60,7 +49,8 @@ class LongTermMemory:
     where only that is consolidated. A `location` that is a `PoseListener` is told of all that is committed
     to those servers, and so of the robot's own poses. `on_set_aside` is told of every snapshot that cannot be kept.
 
-    Tell it which servers it is behind (`serve`), and `close` it after them: that empties the backlog.
+    Tell it which servers it is behind (`serve`), and `close` it after them: that empties the backlog. Where only what
+    leaves working memory is consolidated, what those servers still hold leaves then.
     """
 
     def __init__(
@@ -77,30 +67,34 @@ class LongTermMemory:
     ) -> None:
         self.memory = memory
         self.settings = settings if settings is not None else Consolidation()
-        self._location = location
         self._poses = location if isinstance(location, PoseListener) else None
-        self._gate = RememberingGate(gate if gate is not None else OpenGate())
-        self._on_set_aside = on_set_aside
         self._clock = clock
         self._types: dict[str, SegmentTypes] = {}
+        self._holding: list[MemoryServer] = []
         self._catalogue = Catalogue(memory)
         if agent is not None:
             check_short_name(agent, what="the agent of a long-term memory, which is the robot,")
         self._writer = EventWriter(memory, self._catalogue, agent=agent, location=location, subjects=subjects)
         self._backlog = Backlog(self.settings.backlog, self.settings.backlog_bytes)
-        self._lock = Lock()
-        self._aside: deque[SetAside] = deque(maxlen=SHOWN)
-        self._set_aside = self._forgotten = 0
         self._health = Health(memory.name)
-        self._hurry = 0
         self._closed = False
-        self._stopped = False
-        self._thread = Thread(target=self._work, name=f"armem-consolidation-{memory.name}", daemon=True)
-        self._thread.start()
+        self._worker = BacklogWorker(
+            self._backlog,
+            self._writer,
+            memory=memory,
+            settings=self.settings,
+            health=self._health,
+            gate=gate,
+            type_of=self._type_of,
+            waits_for_poses=location is not None,
+            on_set_aside=on_set_aside,
+        )
 
     def serve(self, server: MemoryServer) -> None:
-        """Ask this server for the types of its segments, which its snapshots have in elm too."""
+        """Ask this server for the types of its segments, which its snapshots have in elm too, and for what it holds."""
         self._types[server.name] = types_of(server)
+        if self.settings.when is When.ON_EVICTION and self.settings.at_stop:
+            self._holding.append(server)
 
     # The port `Archive`
 
@@ -133,10 +127,7 @@ class LongTermMemory:
         """Take what leaves working memory, where that is what is consolidated; written through it is here already."""
         if self.settings.when is When.ON_EVICTION:
             self._check_open()
-            moment = self._clock()
-            self._backlog.put(
-                [Waiting(snapshot=each.snapshot, aron_type=None, evicted=each.usage, moment=moment) for each in evicted]
-            )
+            self._take(evicted)
 
     def source(self, memory: str) -> Source | None:
         """The long-term memory of that name, what still waits included."""
@@ -145,53 +136,51 @@ class LongTermMemory:
     def status(self) -> Mapping[str, object]:
         """What waits, what was consolidated, what was set aside and why, and how the database is."""
         oldest = self._backlog.oldest()
-        with self._lock:
-            return {
-                "elm_memory": self.memory.name,
-                "when": str(self.settings.when),
-                "durable": self.settings.durable,
-                "backlog": len(self._backlog),
-                "backlog_limit": self._backlog.limit,
-                "backlog_bytes": self._backlog.bytes,
-                "backlog_seconds": 0.0 if oldest is None else time.monotonic() - oldest.since,
-                **self._writer.status(),
-                "forgotten": self._forgotten,
-                "set_aside": self._set_aside,
-                "last_set_aside": [str(each) for each in self._aside][-10:],
-                **self._health.status(),
-            }
+        return {
+            "elm_memory": self.memory.name,
+            "when": str(self.settings.when),
+            "durable": self.settings.durable,
+            "backlog": len(self._backlog),
+            "backlog_limit": self._backlog.limit,
+            "backlog_bytes": self._backlog.bytes,
+            "backlog_seconds": 0.0 if oldest is None else time.monotonic() - oldest.since,
+            **self._writer.status(),
+            **self._worker.status(),
+            **self._health.status(),
+        }
 
     # Looking after it
 
     @property
     def set_aside(self) -> tuple[SetAside, ...]:
         """The last snapshots that could not be kept, with the reasons."""
-        with self._lock:
-            return tuple(self._aside)
+        return self._worker.set_aside
 
     def flush(self, timeout: float | None = None) -> bool:
         """Wait until what waits now is durable, forgotten or set aside; whether that was within `timeout` seconds."""
         last = self._backlog.last
-        self._hurry = max(self._hurry, last)
-        self._backlog.wake()
+        self._worker.hurry(last)
         return self._backlog.wait_until_done(last, timeout)
 
     def close(self, timeout: float = STOP_TIMEOUT) -> None:
         """Take nothing more, make durable what waits, and stop; closing again changes nothing.
 
-        `NotConsolidated` where that takes longer than `timeout` seconds: it is tried on until the process
+        `NotConsolidated` where for `timeout` seconds nothing of it becomes so: it is tried on until the process
         ends, and what waits then is lost to long-term memory. Closing can be tried again meanwhile.
         """
         self._closed = True
+        while self._holding:
+            self._take(self._holding.pop().held())
         self._backlog.close()
-        if not self.flush(timeout):
-            raise NotConsolidated(
-                f"{len(self._backlog):,} snapshots are not durable after {timeout:g} s ({self._health.why_slow()}): "
-                f"they are lost if this process ends now. Look after the database and close again"
-            )
-        self._stopped = True
-        self._backlog.wake()
-        self._thread.join()
+        left = len(self._backlog)
+        while not self.flush(timeout):
+            if len(self._backlog) >= left:
+                raise NotConsolidated(
+                    f"{left:,} snapshots are not durable after {timeout:g} s ({self._health.why_slow()}): "
+                    f"they are lost if this process ends now. Look after the database and close again"
+                )
+            left = len(self._backlog)
+        self._worker.stop()
 
     def __enter__(self) -> Self:
         return self
@@ -206,6 +195,12 @@ class LongTermMemory:
     def _check_open(self) -> None:
         if self._closed:
             raise ArchiveClosed(f"the long-term memory {self.memory.name!r:.80} was closed: make a new one")
+
+    def _take(self, evicted: Sequence[Evicted]) -> None:
+        moment = self._clock()
+        self._backlog.put(
+            [Waiting(snapshot=each.snapshot, aron_type=None, evicted=each, moment=moment) for each in evicted]
+        )
 
     def _type_of(self, snapshot: Snapshot) -> TypeObject | None:
         find = self._types.get(snapshot.id.memory)
@@ -227,79 +222,3 @@ class LongTermMemory:
                     ) from error
             time.sleep(pause)
             pause = min(2 * pause, self.settings.most_pause)
-
-    # The thread that empties the backlog
-
-    def _work(self) -> None:
-        pause = self.settings.least_pause
-        while not self._stopped:
-            batch = self._backlog.take(self.settings.batch, self._is_ready, timeout=1.0)
-            if not batch:
-                if len(self._backlog):
-                    time.sleep(GLANCE)
-                continue
-            try:
-                self._consolidate(batch)
-            except Exception as error:
-                self._health.failed(error)
-                self._sleep(pause)
-                pause = min(2 * pause, self.settings.most_pause)
-            else:
-                self._health.worked()
-                pause = self.settings.least_pause
-
-    def _consolidate(self, batch: Sequence[Waiting]) -> None:
-        self._writer.write(self._let_through(batch), done=self._backlog.done, aside=self._lay_aside)
-
-    def _let_through(self, batch: Sequence[Waiting]) -> list[Waiting]:
-        """What is to be kept of a batch: all that was committed, and of what was evicted what the gate keeps."""
-        kept: list[Waiting] = []
-        for waiting in batch:
-            if waiting.evicted is not None:
-                if not self._keeps(waiting, waiting.evicted):
-                    with self._lock:
-                        self._forgotten += 1
-                    self._backlog.done([waiting])
-                    continue
-                # Decided once: the gate is not asked again when the database has to be.
-                waiting.evicted = None
-                waiting.aron_type = self._type_of(waiting.snapshot)
-            kept.append(waiting)
-        return kept
-
-    def _keeps(self, waiting: Waiting, usage: Usage) -> bool:
-        """What the gate says; where it fails itself, nothing is forgotten on that account."""
-        evicted = Evicted(snapshot=waiting.snapshot, usage=usage)
-        try:
-            return self._gate.keeps(evicted, waiting.moment, LongTermSource(self.memory))
-        except (*UNAVAILABLE, StoreFailure):
-            raise
-        except Exception as error:
-            _logger.exception("online forgetting failed on %s, which is consolidated", waiting.snapshot.id)
-            self._health.stumbled(error)
-            return True
-
-    def _is_ready(self, waiting: Waiting) -> bool:
-        """Whether a snapshot need not wait for poses of the robot any longer."""
-        return (
-            self._location is None
-            or waiting.number <= self._hurry
-            or self._backlog.is_half_full
-            or time.monotonic() - waiting.since >= self.settings.patience
-        )
-
-    def _sleep(self, pause: float) -> None:
-        until = time.monotonic() + pause
-        while not self._stopped and time.monotonic() < until:
-            time.sleep(min(0.05, pause))
-
-    def _lay_aside(self, what: SetAside) -> None:
-        _logger.error("a snapshot cannot be consolidated, and is only in working memory: %s", what)
-        with self._lock:
-            self._set_aside += 1
-            self._aside.append(what)
-        if self._on_set_aside is not None:
-            try:
-                self._on_set_aside(what)
-            except Exception:
-                _logger.exception("what is told of snapshots that are set aside failed itself")

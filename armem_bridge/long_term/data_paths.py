@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 from armem_bridge.aron.data import Data, Dict, List
@@ -41,7 +41,7 @@ class DataPath:
     """
 
     text: str
-    _steps: tuple[_Step, ...] = ()
+    _steps: tuple[_Step, ...] = field(init=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "_steps", tuple(_parse(self.text)))

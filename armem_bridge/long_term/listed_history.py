@@ -6,17 +6,8 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Sequence
 
 from armem_bridge.working.history import index_slice
-from armem_bridge.working.snapshot import Snapshot, supersedes
-
-
-def what_counts(versions: Iterable[Snapshot]) -> list[Snapshot]:
-    """Of the versions of an entity's snapshots those that count, one for each reference time, ascending."""
-    found: dict[int, Snapshot] = {}
-    for snapshot in versions:
-        known = found.get(snapshot.referenced)
-        if known is None or supersedes(snapshot, known):
-            found[snapshot.referenced] = snapshot
-    return [found[moment] for moment in sorted(found)]
+from armem_bridge.working.snapshot import Snapshot
+from armem_bridge.working.versions import last_of, what_counts
 
 
 class ListedHistory:
@@ -27,27 +18,30 @@ class ListedHistory:
         self._moments = [snapshot.referenced for snapshot in self._snapshots]
 
     def all(self) -> Sequence[Snapshot]:
+        """Every snapshot."""
         return self._snapshots
 
     def latest(self, count: int) -> Sequence[Snapshot]:
-        return _last(self._snapshots, count)
+        """The `count` snapshots with the greatest reference times."""
+        return last_of(self._snapshots, count)
 
     def before(self, moment: int, count: int) -> Sequence[Snapshot]:
-        return _last(self._snapshots[: bisect_left(self._moments, moment)], count)
+        """The `count` last snapshots strictly before `moment`."""
+        return last_of(self._snapshots[: bisect_left(self._moments, moment)], count)
 
     def after(self, moment: int, count: int) -> Sequence[Snapshot]:
+        """The `count` first snapshots strictly after `moment`."""
         later = self._snapshots[bisect_right(self._moments, moment) :]
         return later[:count] if count >= 0 else later
 
     def between(self, begin: int, end: int) -> Sequence[Snapshot]:
+        """The snapshots from `begin` to `end`, both included."""
         return self._snapshots[bisect_left(self._moments, begin) : bisect_right(self._moments, end)]
 
     def at(self, moment: int) -> Snapshot | None:
+        """The snapshot with exactly this reference time."""
         return next(iter(self.between(moment, moment)), None)
 
     def index_range(self, first: int, last: int) -> Sequence[Snapshot]:
+        """The snapshots from position `first` to `last`, both included."""
         return self._snapshots[index_slice(first, last, len(self._snapshots))]
-
-
-def _last(snapshots: list[Snapshot], count: int) -> list[Snapshot]:
-    return snapshots[max(len(snapshots) - count, 0) :] if count >= 0 else snapshots

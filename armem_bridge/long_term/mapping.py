@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from typing import Final
 from uuid import UUID
 
@@ -16,7 +15,7 @@ from armem_bridge.moments import is_set, to_datetime
 from armem_bridge.working.snapshot import Snapshot
 from elm.cues import feature_names, features
 from elm.cues.algebra import Cue
-from elm.event import Event, Payload, StoredEvent
+from elm.event import Event, Payload, StoredEvent, hashed_uid
 from elm.features import Feature
 from elm.geometry import Region
 from elm.interval import Interval, to_micros
@@ -53,10 +52,7 @@ def snapshot_uid(snapshot: Snapshot) -> UUID:
         (content_hash(each.data), each.metadata.confidence + 0.0, each.metadata.sent, each.metadata.referenced)
         for each in snapshot.instances
     ]
-    digest = hashlib.sha256(msgspec.msgpack.encode((_UID_FORM, *place.names, place.timestamp, instances))).digest()
-    number = int.from_bytes(digest[:16], "big")
-    number = number & ~(0xF << 76) | 0x8 << 76
-    return UUID(int=number & ~(0x3 << 62) | 0x2 << 62)
+    return hashed_uid(msgspec.msgpack.encode((_UID_FORM, *place.names, place.timestamp, instances)))
 
 
 def arrival_of(

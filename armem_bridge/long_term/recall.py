@@ -6,11 +6,11 @@ from collections.abc import Iterator
 from itertools import count, islice
 from typing import Final
 
-from armem_bridge.long_term.listed_history import what_counts
 from armem_bridge.long_term.mapping import ENTITY, below, is_snapshot, snapshot_of
 from armem_bridge.memory_id import MemoryID
 from armem_bridge.moments import to_datetime
 from armem_bridge.working.snapshot import Snapshot
+from armem_bridge.working.versions import what_counts
 from elm.app import Memory
 from elm.cues import any_of, features, time
 from elm.cues.algebra import Cue

@@ -7,6 +7,7 @@ from threading import Lock
 from typing import Final, Protocol, runtime_checkable
 
 import numpy as np
+import numpy.typing as npt
 from shapely.geometry import Polygon
 from sortedcontainers import SortedDict
 
@@ -15,6 +16,9 @@ from armem_bridge.long_term.refusals import InvalidArchive
 from armem_bridge.working.snapshot import Snapshot, snapshot_hash
 from elm.errors import InvalidValue
 from elm.geometry import DEFAULT_FRAME, Region
+
+FOOTPRINT: Final = 0.3
+"""The radius of a robot in metres unless told otherwise."""
 
 MAX_AGE: Final = 1_000_000
 """How many microseconds a pose holds for unless told otherwise."""
@@ -38,6 +42,27 @@ class PoseListener(Protocol):
         """These versions were committed; whether long-term memory takes them is not decided yet."""
 
 
+def check_footprint(footprint: float | Sequence[Sequence[float]]) -> None:
+    """Raise `InvalidArchive` unless this is a radius above 0, or the corners of a polygon, in metres."""
+    try:
+        if isinstance(footprint, int | float):
+            Region.around(0.0, 0.0, footprint)
+        else:
+            Region(polygon=Polygon(_corners(footprint)))
+    except InvalidValue as error:
+        raise InvalidArchive(f"the footprint of a robot cannot be this: {error}") from error
+
+
+def _corners(footprint: Sequence[Sequence[float]]) -> npt.NDArray[np.float64]:
+    try:
+        corners = np.array(footprint, dtype=np.float64)
+    except (TypeError, ValueError):
+        corners = np.empty(0)
+    if corners.ndim != 2 or corners.shape[0] < 3 or corners.shape[1] != 2 or not np.isfinite(corners).all():
+        raise InvalidValue(f"a polygon has three or more corners, each a finite x and y, not {footprint!r:.80}")
+    return corners
+
+
 class RobotPlaces:
     """A `LocationPort` over the poses that snapshots of a robot's state have.
 
@@ -52,7 +77,7 @@ class RobotPlaces:
         self,
         pose: PosePath,
         *,
-        footprint: float | Sequence[tuple[float, float]] = 0.3,
+        footprint: float | Sequence[tuple[float, float]] = FOOTPRINT,
         frame: str = DEFAULT_FRAME,
         max_age: int = MAX_AGE,
         limit: int = POSES,
@@ -60,7 +85,8 @@ class RobotPlaces:
         if max_age < 0 or limit < 1:
             raise InvalidArchive(f"poses hold for 0 µs or more, and 1 or more are kept: not {max_age} µs and {limit}")
         self._path = pose
-        self._footprint = footprint
+        check_footprint(footprint)
+        self._footprint = footprint if isinstance(footprint, int | float) else _corners(footprint)
         self._frame = frame
         self._max_age = max_age
         self._limit = limit
@@ -96,6 +122,7 @@ class RobotPlaces:
                     self._places.popitem(0)
 
     def region(self, moment: int) -> Region | None:
+        """The footprint at the last pose at or before a moment, None where that is too old or there is none."""
         with self._lock:
             index = self._places.bisect_right(moment) - 1
             if index < 0:
@@ -110,5 +137,5 @@ class RobotPlaces:
             return Region.around(x, y, self._footprint, frame=self._frame)
         if pose.rotation is None:
             raise NoPose("a footprint with corners needs a pose with an orientation")
-        turned = np.array(self._footprint, dtype=np.float64) @ pose.rotation[:2, :2].T + (x, y)
+        turned = self._footprint @ pose.rotation[:2, :2].T + (x, y)
         return Region(polygon=Polygon(turned), frame=self._frame)

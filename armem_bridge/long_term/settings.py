@@ -23,6 +23,9 @@ class Consolidation:
     """The settings of `LongTermMemory`; times are seconds."""
 
     when: When = When.ON_COMMIT
+    at_stop: bool = True
+    """Whether what is still in working memory when this is closed is consolidated then, as if it left."""
+
     durable: bool = False
     """Whether a commit is acknowledged only after consolidation; otherwise that happens soon after."""
 
@@ -52,6 +55,13 @@ class Consolidation:
         object.__setattr__(self, "when", _when(self.when))
         if self.durable and self.when is not When.ON_COMMIT:
             raise InvalidArchive("commits are only durable with when='on_commit': what is evicted was committed before")
+        if not isinstance(self.at_stop, bool):
+            raise InvalidArchive(f"the setting at_stop of consolidation is true or false, not {self.at_stop!r:.80}")
+        if not self.at_stop and self.when is not When.ON_EVICTION:
+            raise InvalidArchive(
+                "at_stop = false goes with when='on_eviction': what is consolidated at its commit is there before the "
+                "stop. Leave it out"
+            )
         for name in ("backlog", "backlog_bytes", "batch"):
             value = getattr(self, name)
             if type(value) is not int or value < 1:

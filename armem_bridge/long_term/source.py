@@ -12,7 +12,8 @@ from armem_bridge.long_term.mapping import CORE_SEGMENT, ENTITY, PROVIDER_SEGMEN
 from armem_bridge.memory_id import Level, MemoryID
 from armem_bridge.moments import to_datetime
 from armem_bridge.working.history import History, read_index_range
-from armem_bridge.working.snapshot import Snapshot, supersedes
+from armem_bridge.working.snapshot import Snapshot
+from armem_bridge.working.versions import take_in
 from elm.app import Memory
 from elm.cues import time
 from elm.cues.algebra import Cue
@@ -55,6 +56,7 @@ class LongTermSource:
         self._catalogue = catalogue
 
     def names(self, parent: MemoryID) -> Sequence[str]:
+        """The names one level below `parent`, in order: from the catalogue, without one looked up in elm."""
         if self._catalogue is not None:
             return names_below(parent, self._catalogue.entities())
         by = ByFeature(name=_FEATURES[parent.level])
@@ -62,12 +64,15 @@ class LongTermSource:
         return sorted(group.key for group in groups if isinstance(group.key, str) and group.key)
 
     def knows(self, name: MemoryID) -> bool:
+        """Whether elm has snapshots of this or of what is below it."""
         return _unless_missing(lambda: self._memory.recall(below(name)).exists(), False)
 
     def segment_type(self, segment: MemoryID) -> TypeObject | None:
+        """None: types are not kept."""
         return None
 
     def history(self, entity: MemoryID) -> History:
+        """The snapshots of an entity, each question asked in elm."""
         return LongTermHistory(self._memory, entity)
 
 
@@ -83,24 +88,31 @@ class LongTermHistory:
         self._cue = below(entity)
 
     def all(self) -> Sequence[Snapshot]:
+        """Every snapshot."""
         return self._first(-1, None, None)
 
     def latest(self, count: int) -> Sequence[Snapshot]:
+        """The `count` snapshots with the greatest reference times."""
         return self._last(count, None)
 
     def before(self, moment: int, count: int) -> Sequence[Snapshot]:
+        """The `count` last snapshots strictly before `moment`."""
         return self._last(count, moment - 1) if moment > 0 else ()
 
     def after(self, moment: int, count: int) -> Sequence[Snapshot]:
+        """The `count` first snapshots strictly after `moment`."""
         return self._first(count, moment + 1, None)
 
     def between(self, begin: int, end: int) -> Sequence[Snapshot]:
+        """The snapshots from `begin` to `end`, both included."""
         return self._first(-1, begin, end)
 
     def at(self, moment: int) -> Snapshot | None:
+        """The snapshot with exactly this reference time."""
         return next(iter(self.between(moment, moment)), None)
 
     def index_range(self, first: int, last: int) -> Sequence[Snapshot]:
+        """The snapshots from position `first` to `last`, both included; all are read if one counts from each end."""
         return read_index_range(self, first, last)
 
     def _first(self, count: int, begin: int | None, end: int | None) -> Sequence[Snapshot]:
@@ -121,12 +133,9 @@ class LongTermHistory:
         if count == 0:
             return []
         for snapshot in self._versions(order, count, begin, end):
-            moment = snapshot.referenced
-            known = found.get(moment)
-            if known is None and len(found) == count:
+            if len(found) == count and snapshot.referenced not in found:
                 break
-            if known is None or supersedes(snapshot, known):
-                found[moment] = snapshot
+            take_in(found, snapshot)
         return list(found.values())
 
     def _versions(

@@ -128,13 +128,16 @@ class EventWriter:
         # Not when they are made: that is done again as often as the database has to be asked.
         nowhere = sum(arrival.event.region is None for _, arrival in ready)
         self._count(consolidated=report.new, repeated=report.existing, without_region=nowhere)
+        lost: set[int] = set()
         for refusal in report.refused:
             waiting, arrival = ready[refusal.index]
             if arrival.event.uid in known:
                 self._count(repeated=1)
             else:
+                lost.add(refusal.index)
                 aside(SetAside(snapshot=waiting.snapshot, reason=refusal.reason))
-        self._catalogue.add(waiting.snapshot.id.entity_id for waiting, _ in ready)
+        kept = (waiting for index, (waiting, _) in enumerate(ready) if index not in lost)
+        self._catalogue.add(waiting.snapshot.id.entity_id for waiting in kept)
         done([waiting for waiting, _ in ready])
 
     def write_all(self, given: Sequence[tuple[Snapshot, TypeObject | None]]) -> None:

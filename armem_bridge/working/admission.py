@@ -9,26 +9,61 @@ from armem_bridge.aron.data import Data, Dict, List, NDArray, String
 from armem_bridge.aron.inheritance import faults
 from armem_bridge.aron.realization import realizes
 from armem_bridge.memory_id import InvalidMemoryID, MemoryID
-from armem_bridge.moments import GREATEST
-from armem_bridge.working.commit import EntityUpdate
-from armem_bridge.working.segments import AddSegment
+from armem_bridge.moments import GREATEST, INVALID
+from armem_bridge.working.commit import Commit, EntityUpdate
+from armem_bridge.working.refusals import InvalidCommit
+from armem_bridge.working.segments import AddSegment, why_no_segment_type
 from armem_bridge.working.working_memory import WorkingMemory
+
+
+def check_commit(commit: Commit) -> None:
+    """Raise `InvalidCommit` for what is no commit; what is wrong with single updates is told by `why_refused`."""
+    if not isinstance(commit, Commit):
+        raise InvalidCommit(
+            f"what is committed is a Commit, not a {type(commit).__name__}: make one with Commit(updates=[...])"
+        )
+
+
+def check_wishes(wishes: Sequence[AddSegment]) -> None:
+    """Raise `InvalidCommit` for what are no wishes for segments."""
+    if not isinstance(wishes, Sequence) or not all(isinstance(wish, AddSegment) for wish in wishes):
+        raise InvalidCommit(
+            f"segments are wished for by a list of AddSegment, not by {wishes!r:.80}: put each wish into one list"
+        )
+
+
+def why_malformed(update: EntityUpdate) -> str:
+    """Why no memory whatever takes an update, and what to do about it; empty when some may.
+
+    That the referenced time is not set is no fault here, for some memories then take that of the arrival.
+    """
+    return _about_kind(update) or _about_times(update, INVALID) or _about_form(update)
 
 
 def why_refused(update: EntityUpdate, memory: WorkingMemory, size_limit: int) -> str:
     """Why `memory` does not take an update, and what to do about it; empty when it does."""
     return (
-        _about_place(update.entity, memory)
-        or _about_times(update)
+        _about_kind(update)
+        or _about_place(update.entity, memory)
+        or _about_times(update, 0)
         or _about_form(update)
         or _about_size(update, size_limit)
-        or why_of_another_type(update.entity, update.instances, memory)
+        or _about_type(update, memory)
     )
 
 
+def _about_kind(update: EntityUpdate) -> str:
+    if not isinstance(update, EntityUpdate):
+        return f"the updates of a commit are EntityUpdates, and this is a {type(update).__name__}: {update!r:.80}"
+    if not isinstance(update.entity, MemoryID):
+        return (
+            f"an update is of an entity, named by a MemoryID, not by a {type(update.entity).__name__}: "
+            f"make text one with MemoryID.parse"
+        )
+    return ""
+
+
 def _about_place(entity: MemoryID, memory: WorkingMemory) -> str:
-    if not isinstance(entity, MemoryID):
-        return f"an update is of an entity, named by a MemoryID, not by a {type(entity).__name__}"
     if entity.memory != memory.id.memory:
         return f"the update of {entity} is for the memory {entity.memory!r:.80}; this is {memory.id.memory!r:.80}"
     if not (entity.core_segment and entity.provider_segment and entity.entity):
@@ -50,11 +85,11 @@ def _about_place(entity: MemoryID, memory: WorkingMemory) -> str:
     return ""
 
 
-def _about_times(update: EntityUpdate) -> str:
-    if type(update.referenced) is not int or not 0 <= update.referenced <= GREATEST:
+def _about_times(update: EntityUpdate, least: int) -> str:
+    if type(update.referenced) is not int or not least <= update.referenced <= GREATEST:
         return (
             f"the update of {update.entity} has no valid referenced time ({update.referenced!r:.80}): give the time "
-            f"that the data are about, in microseconds since 1970"
+            f"that the data are about, in microseconds since 1970 or as a datetime with its zone"
         )
     if type(update.sent) is not int or update.sent > GREATEST:
         return (
@@ -92,16 +127,16 @@ def _about_size(update: EntityUpdate, limit: int) -> str:
     return ""
 
 
-def why_of_another_type(entity: MemoryID, instances: Sequence[Dict | None], memory: WorkingMemory) -> str:
-    """Why the instances are not what the segment of an entity asks for; empty when they are, or it asks nothing."""
-    wanted = memory.type_for(entity.core_segment, entity.provider_segment)
+def _about_type(update: EntityUpdate, memory: WorkingMemory) -> str:
+    wanted = memory.type_for(update.entity.core_segment, update.entity.provider_segment)
     if wanted is None:
         return ""
-    for index, data in enumerate(instances):
+    for index, data in enumerate(update.instances):
         realization = realizes(data, wanted)
         if not realization:
             return (
-                f"instance {index} of the update of {entity} is not of the type of its segment: {realization.explain()}"
+                f"instance {index} of the update of {update.entity} is not of the type of its segment: "
+                f"{realization.explain()}"
             )
     return ""
 
@@ -127,6 +162,9 @@ def why_no_segment(wish: AddSegment, memory: WorkingMemory) -> str:
         memory.id.with_provider_segment(wish.provider_segment)
     except InvalidMemoryID as error:
         return f"{what} cannot have this name: {error}"
+    no_type = why_no_segment_type(wish.aron_type)
+    if no_type:
+        return f"{what} {no_type}"
     wrong = faults(core.aron_type, wish.aron_type) if core.aron_type and wish.aron_type else ()
     if wrong:
         return f"the type of {what} does not extend the core segment's: {'; '.join(wrong)}"

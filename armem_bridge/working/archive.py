@@ -19,6 +19,8 @@ class Evicted(msgspec.Struct, frozen=True, kw_only=True):
 
     snapshot: Snapshot
     usage: Usage
+    superseded: bool = False
+    """Whether it left because another version of the snapshot counts, which is in working memory."""
 
 
 class NotKept(ArmemError, ValueError):
@@ -41,8 +43,9 @@ class Archive(Protocol):
     def consolidate(self, snapshots: Sequence[Snapshot]) -> None:
         """Every version that a commit brought, before it is in working memory and before it is acknowledged.
 
-        May wait, for durability or for room. An error refuses the updates: nothing of them is inserted. With
-        `NotKept` only those that it names are refused, and this is called again with the others.
+        May wait, for durability or for room; the segments of the server do not change meanwhile, so it must not
+        add any itself. An error refuses the updates: nothing of them is inserted. With `NotKept` only those
+        that it names are refused, and this is called again with the others.
         """
 
     def on_eviction(self, evicted: Sequence[Evicted]) -> None:

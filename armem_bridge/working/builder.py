@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from datetime import datetime
+from datetime import datetime, timedelta
 from typing import Generic, TypeVar
 
 from armem_bridge.memory_id import MemoryID
@@ -29,6 +29,7 @@ from armem_bridge.working.query import (
     SnapshotQuery,
     TimeRange,
 )
+from armem_bridge.working.refusals import InvalidQuery
 
 _Selection = TypeVar("_Selection")
 
@@ -102,10 +103,11 @@ class SnapshotsSelector:
         """The snapshots from one position to another, both included; -1 is the latest."""
         self.selections.append(IndexRange(first=first, last=last))
 
-    def approximate(self, time: int | datetime, *, eps: int = NOT_SET) -> None:
-        """The snapshot at a time, or else its neighbours that are at most `eps` microseconds away."""
+    def approximate(self, time: int | datetime, *, eps: int | timedelta = NOT_SET) -> None:
+        """The snapshot at a time, or else its neighbours that are at most `eps` away, in microseconds if a number."""
         moment = as_moment(time, what="the time around which to look")
-        self.selections.append(Approximate(timestamp=moment, eps=eps))
+        tolerance = eps // timedelta(microseconds=1) if isinstance(eps, timedelta) else eps
+        self.selections.append(Approximate(timestamp=moment, eps=tolerance))
 
 
 class EntitiesSelection:
@@ -174,7 +176,12 @@ class QueryBuilder:
         return self.memories.all().core_segments
 
     def select(self, wanted: MemoryID) -> None:
-        """Everything that an ID contains: what is not set in it selects all."""
+        """Everything that an ID contains, down to whole snapshots: what is not set in it selects all.
+
+        Queries know no instances, as in ArmarX: the ID of one selects the snapshot that it would be in.
+        """
+        if not isinstance(wanted, MemoryID):
+            raise InvalidQuery(f"what is selected is a MemoryID, not {wanted!r:.80}: make text one with MemoryID.parse")
 
         def pick(selector: NamesSelector[_Selection], name: str) -> _Selection:
             return selector.name(name) if name else selector.all()

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Sequence
+from datetime import datetime
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 from msgspec.structs import force_setattr
 
 from armem_bridge.aron.data import Dict
 from armem_bridge.memory_id import MemoryID
-from armem_bridge.moments import NOT_SET
+from armem_bridge.moments import NOT_SET, InvalidMoment, as_moment
+from armem_bridge.working.refusals import InvalidCommit
 
 
 class EntityUpdate(msgspec.Struct, frozen=True, kw_only=True):
@@ -25,12 +27,44 @@ class EntityUpdate(msgspec.Struct, frozen=True, kw_only=True):
 
     instances: tuple[Dict | None, ...]
     referenced: int
-    """The time that the data are about, in microseconds."""
+    """The time that the data are about, in microseconds; given as a datetime with its zone it is made that."""
 
     sent: int = NOT_SET
-    """When the client sent it, by its own clock; negative where it does not say."""
+    """When the client sent it, by its own clock; negative where it does not say: then it is the time of the commit.
+
+    Of several versions of a snapshot that one counts which was sent last. An update that is to change nothing
+    when it is committed again has a sent time of its own.
+    """
 
     confidence: float = 1.0
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            *,
+            entity: MemoryID,
+            instances: Sequence[Dict | None],
+            referenced: int | datetime,
+            sent: int | datetime = ...,
+            confidence: float = ...,
+        ) -> None: ...
+
+    def __post_init__(self) -> None:
+        if isinstance(self.instances, list):
+            force_setattr(self, "instances", tuple(self.instances))
+        if type(self.referenced) is not int:
+            force_setattr(self, "referenced", _moment(self.referenced))
+        if type(self.sent) is not int:
+            force_setattr(self, "sent", _moment(self.sent))
+
+
+def _moment(given: Any) -> Any:
+    """A time in microseconds; what is none stays as it is, for the memory server to refuse."""
+    try:
+        return as_moment(given, what="the time")
+    except InvalidMoment:
+        return given
 
 
 class Commit(msgspec.Struct, frozen=True, kw_only=True):
@@ -44,6 +78,10 @@ class Commit(msgspec.Struct, frozen=True, kw_only=True):
 
     def __post_init__(self) -> None:
         if type(self.updates) is not tuple:
+            if not isinstance(self.updates, Iterable):
+                raise InvalidCommit(
+                    f"a commit has a list of updates, not {self.updates!r:.80}: put a single one into a list too"
+                )
             force_setattr(self, "updates", tuple(self.updates))
 
 

@@ -42,12 +42,17 @@ def evaluate(query: Query, source: Source, memory: str) -> Memory:
     root = MemoryID(memory=memory)
     found: dict[str, CoreSegment] = {}
     for wanted in query.memories:
-        if memory in _selected(wanted.names, (memory,)):
+        if selects(wanted.names, memory):
             _core_segments(wanted.core_segments, root, source, found)
     result = Memory(id=root, core_segments=found)
     for entity in result.entities():
         _finish(entity.history, query.with_data)
     return result
+
+
+def selects(names: Names, name: str) -> bool:
+    """Whether a name is among those selected."""
+    return name in _selected(names, (name,))
 
 
 def _core_segments(

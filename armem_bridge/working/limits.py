@@ -22,6 +22,10 @@ class HistoryLimits:
 
     def __init__(self, limits: Mapping[MemoryID, int]) -> None:
         for where, limit in limits.items():
+            if not isinstance(where, MemoryID):
+                raise InvalidServer(
+                    f"a history limit is set by a MemoryID, not by {where!r:.80}: make text one with MemoryID.parse"
+                )
             if where != where.entity_id or where.has_gap:
                 raise InvalidServer(f"a history limit is set for an entity, a segment or a memory, not for {where}")
             if type(limit) is not int or not (limit >= 1 or limit == UNLIMITED):

@@ -11,7 +11,8 @@ class Metadata(msgspec.Struct, frozen=True, kw_only=True):
     """The metadata of one instance; all instances of an update have the same.
 
     `referenced` is the time that the data are about and `sent` the time at which the client sent them, by
-    its clock, negative where it did not say; `arrived` is when the memory server had them, by its own.
+    its clock; `arrived` is when the memory server had them, by its own. Where the client did not say when it
+    sent them, that is `sent` too. Negative times are not set.
     """
 
     confidence: float = 1.0

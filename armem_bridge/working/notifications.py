@@ -11,6 +11,7 @@ from typing import Final
 import msgspec
 
 from armem_bridge.memory_id import MemoryID
+from armem_bridge.working.refusals import InvalidSubscription
 
 Listener = Callable[[Sequence[MemoryID]], None]
 """Called with the IDs of the snapshots that one commit updated, in a thread of its own."""
@@ -39,10 +40,28 @@ class ListenerStatus(msgspec.Struct, frozen=True, kw_only=True):
     """What it raised last; empty if nothing."""
 
 
+def check_listener(listener: Listener, subscribed: MemoryID) -> None:
+    """Raise `InvalidSubscription` for what cannot be called, or not be asked what it contains."""
+    if not callable(listener):
+        raise InvalidSubscription(
+            f"a listener is called with IDs, and a {type(listener).__name__} cannot be: give a function"
+        )
+    if not isinstance(subscribed, MemoryID):
+        raise InvalidSubscription(
+            f"what is subscribed to is a MemoryID, not {subscribed!r:.80}: make text one with MemoryID.parse"
+        )
+
+
 class Subscription:
-    """One listener with its queue and its thread. `close` ends it."""
+    """One listener with its queue and its thread. `close` ends it.
+
+    It is valid from birth, so that no offer fails: those come from commits that are made already.
+    """
 
     def __init__(self, listener: Listener, subscribed: MemoryID, queue_limit: int) -> None:
+        check_listener(listener, subscribed)
+        if type(queue_limit) is not int or queue_limit < 1:
+            raise InvalidSubscription(f"so many messages wait for a listener, 1 or more: not {queue_limit!r:.80}")
         self._listener = listener
         self._subscribed = subscribed
         self._limit = queue_limit

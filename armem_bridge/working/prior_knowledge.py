@@ -27,6 +27,7 @@ from armem_bridge.moments import GREATEST
 from armem_bridge.working.admission import why_refused
 from armem_bridge.working.commit import EntityUpdate
 from armem_bridge.working.refusals import InvalidPriorKnowledge
+from armem_bridge.working.segments import why_no_segment_type
 from armem_bridge.working.versions import snapshot_of
 from armem_bridge.working.working_memory import Provider, WorkingMemory
 
@@ -102,6 +103,9 @@ def _provider(path: Path, file: _File, memory: WorkingMemory) -> Provider:
         own = type_from_json(file.type)
     except ArmemError as error:
         raise InvalidPriorKnowledge(f"the type in {path} cannot be read: {error}") from error
+    no_type = why_no_segment_type(own)
+    if no_type:
+        raise InvalidPriorKnowledge(f"the provider segment {file.provider_segment!r:.80} in {path} {no_type}")
     wrong = faults(core.aron_type, own) if core.aron_type is not None else ()
     if wrong:
         raise InvalidPriorKnowledge(f"the type in {path} does not extend its core segment's: {'; '.join(wrong)}")

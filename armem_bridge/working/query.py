@@ -238,6 +238,14 @@ class Query(msgspec.Struct, frozen=True, kw_only=True):
             force_setattr(self, "target", _target(self.target))
 
 
+def check_query(query: Query) -> None:
+    """Raise `InvalidQuery` for what is no query, such as a builder of one."""
+    if not isinstance(query, Query):
+        raise InvalidQuery(
+            f"a memory is asked with a Query, not with a {type(query).__name__}: a QueryBuilder makes one with build()"
+        )
+
+
 def _target(given: str) -> QueryTarget:
     try:
         return QueryTarget(given)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import msgspec
 
+import armem_bridge.aron.type_objects as t
 from armem_bridge.aron.type_objects import TypeObject
 from armem_bridge.memory_id import MemoryID
 
@@ -13,6 +14,14 @@ class CoreSegmentDefinition(msgspec.Struct, frozen=True, kw_only=True):
 
     name: str
     aron_type: TypeObject | None = None
+
+
+def why_no_segment_type(aron_type: TypeObject | None) -> str:
+    """Why nothing could be committed to a segment of a type, as the end of a sentence; empty when something could."""
+    if aron_type is None or isinstance(aron_type, t.Object | t.Dict | t.Any):
+        return ""
+    what = type(aron_type).__name__ if isinstance(aron_type, t.KINDS) else f"{aron_type!r:.80}"
+    return f"has the type {what}, and instances are Dicts: give it an Object, a Dict or none"
 
 
 class AddSegment(msgspec.Struct, frozen=True, kw_only=True):

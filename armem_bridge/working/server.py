@@ -9,10 +9,10 @@ from types import TracebackType
 from typing import Final, Self
 
 from armem_bridge.aron.type_objects import TypeObject
-from armem_bridge.memory_id import MemoryID
+from armem_bridge.memory_id import InvalidMemoryID, MemoryID
 from armem_bridge.moments import Clock, now
 from armem_bridge.working.access_statistics import Usage
-from armem_bridge.working.admission import why_no_segment, why_of_another_type, why_refused
+from armem_bridge.working.admission import check_commit, check_wishes, why_no_segment, why_refused
 from armem_bridge.working.archive import Archive, Evicted, NotKept
 from armem_bridge.working.commit import Commit, CommitResult, EntityUpdate, UpdateResult
 from armem_bridge.working.counters import Counters
@@ -22,7 +22,7 @@ from armem_bridge.working.history import Source
 from armem_bridge.working.limits import HistoryLimits
 from armem_bridge.working.notifications import QUEUE_LIMIT, Listener, Notifier, Subscription
 from armem_bridge.working.prior_knowledge import load_prior_knowledge
-from armem_bridge.working.query import Query, QueryTarget
+from armem_bridge.working.query import Query, QueryTarget, check_query
 from armem_bridge.working.refusals import InvalidServer
 from armem_bridge.working.segments import AddSegment, CoreSegmentDefinition, SegmentResult
 from armem_bridge.working.snapshot import Snapshot
@@ -92,9 +92,10 @@ class MemoryServer:
 
         Refused are: segments of core segments that the memory does not have, types that do not extend the
         core segment's, another type for a segment that has entities, and changes of prior knowledge. That
-        the segment exists already is no fault.
+        the segment exists already is no fault. Commits that are going on are over before, and others wait.
         """
-        with self._door:
+        check_wishes(wishes)
+        with self._door.alone():
             return tuple(map(self._add_segment, wishes))
 
     def commit(self, commit: Commit) -> CommitResult:
@@ -106,18 +107,16 @@ class MemoryServer:
         one counts that `snapshot.supersedes` says; the update that brought the other one succeeds too, for
         the archive keeps both. Listeners get one message with the IDs of all updates that were made.
         """
+        check_commit(commit)
         with self._door:
             return self._commit(commit)
 
     def _commit(self, commit: Commit) -> CommitResult:
         arrived = self._clock()
-        generation = self._memory.generation
         outcomes = [self._admit(update, arrived) for update in commit.updates]
         outcomes = self._consolidate(outcomes)
         left: list[Evicted] = []
         with self._memory.lock:
-            if self._memory.generation != generation:
-                outcomes = [self._admit_again(outcome) for outcome in outcomes]
             made = [outcome for outcome in outcomes if isinstance(outcome, Snapshot)]
             for snapshot in made:
                 left += self._memory.put(snapshot)
@@ -133,6 +132,7 @@ class MemoryServer:
 
         Without an archive long-term memory is empty. The snapshots in the result are shared, not copied.
         """
+        check_query(query)
         result = evaluate(query, self._source(query.target), self.name)
         moment = self._clock()
         with self._memory.lock:
@@ -143,14 +143,18 @@ class MemoryServer:
     def get(self, wanted: MemoryID, *, target: QueryTarget = QueryTarget.WM) -> Snapshot | None:
         """The snapshot that an ID names, the latest one for the ID of an entity; None where there is none.
 
-        Unlike a query this does not count as a use.
+        For the ID of an instance it is the snapshot which that instance is in. Unlike a query this does not
+        count as a use.
         """
+        if not isinstance(wanted, MemoryID):
+            raise InvalidMemoryID(
+                f"a snapshot is asked for by a MemoryID, not by {wanted!r:.80}: make text one with MemoryID.parse"
+            )
         if wanted.memory != self.name or not wanted.entity:
             return None
         history = self._source(target).history(wanted.entity_id)
-        if wanted.timestamp >= 0:
-            return history.at(wanted.timestamp)
-        return next(iter(history.latest(1)), None)
+        found = history.at(wanted.timestamp) if wanted.timestamp >= 0 else next(iter(history.latest(1)), None)
+        return found if found is not None and wanted.instance < len(found.instances) else None
 
     def segment_type(self, segment: MemoryID) -> TypeObject | None:
         """The type of a core or provider segment; None where it has none, or is not there."""
@@ -160,6 +164,13 @@ class MemoryServer:
         """How often and when last queries returned a snapshot that is in working memory."""
         return self._memory.usage(snapshot)
 
+    def held(self) -> list[Evicted]:
+        """All that is in working memory but prior knowledge, as if it left now; of each entity the oldest first.
+
+        This does not count as a use.
+        """
+        return self._memory.held()
+
     def subscribe(
         self, listener: Listener, subscribed: MemoryID = _EVERYTHING, *, queue_limit: int = QUEUE_LIMIT
     ) -> Subscription:
@@ -167,6 +178,7 @@ class MemoryServer:
 
         It is called in a thread of its own, after the commit. Where it is too slow the oldest messages of
         its queue are dropped; where it raises, the status says so, and it is called again the next time.
+        Raises `InvalidSubscription` for an ID that is none and for a queue that nothing fits into.
         """
         with self._door:
             return self._notifier.subscribe(listener, subscribed, queue_limit)
@@ -232,13 +244,6 @@ class MemoryServer:
     def _admit(self, update: EntityUpdate, arrived: int) -> Snapshot | str:
         """The snapshot that an update makes, or why it is refused."""
         return why_refused(update, self._memory, self._update_bytes) or snapshot_of(update, arrived=arrived)
-
-    def _admit_again(self, outcome: Snapshot | str) -> Snapshot | str:
-        """The same after segments were changed by others: the type may be another now."""
-        if isinstance(outcome, str):
-            return outcome
-        data = [instance.data for instance in outcome.instances]
-        return why_of_another_type(outcome.id.entity_id, data, self._memory) or outcome
 
     def _consolidate(self, outcomes: list[Snapshot | str]) -> list[Snapshot | str]:
         """Hand the new snapshots to the archive; if it cannot take them, they are refused."""

@@ -14,9 +14,10 @@ from armem_bridge.working.snapshot import Snapshot, supersedes
 
 
 class SortedHistory:
-    """A `History` in main memory. Reading takes the lock for as long as references are copied.
+    """A `History` in main memory.
 
-    `put`, `drop_oldest` and `note_use` are called by who holds the lock already.
+    Reading several snapshots takes the lock for as long as references are copied; `at` and `usage` look one up,
+    and take none. `put`, `clear`, `note_use` and `held` are called by who holds the lock already.
     """
 
     def __init__(self, lock: Lock, limit: int | None) -> None:
@@ -44,9 +45,9 @@ class SortedHistory:
             return [self._drop_oldest()]
         if supersedes(snapshot, known):
             self._snapshots[moment] = snapshot
-            return [Evicted(snapshot=known, usage=self._usage.pop(moment, UNUSED))]
+            return [Evicted(snapshot=known, usage=self._usage.pop(moment, UNUSED), superseded=True)]
         if supersedes(known, snapshot):
-            return [Evicted(snapshot=snapshot, usage=UNUSED)]
+            return [Evicted(snapshot=snapshot, usage=UNUSED, superseded=True)]
         return []
 
     def clear(self) -> list[Evicted]:
@@ -60,6 +61,13 @@ class SortedHistory:
             if moment in snapshots:
                 usage[moment] = usage.get(moment, UNUSED).again(now)
 
+    def held(self) -> list[Evicted]:
+        """What would leave if everything did, the oldest reference time first."""
+        usage = self._usage
+        return [
+            Evicted(snapshot=snapshot, usage=usage.get(moment, UNUSED)) for moment, snapshot in self._snapshots.items()
+        ]
+
     def _drop_oldest(self) -> Evicted:
         moment, snapshot = self._snapshots.popitem(0)
         return Evicted(snapshot=snapshot, usage=self._usage.pop(moment, UNUSED))
@@ -71,33 +79,40 @@ class SortedHistory:
         return self._usage.get(moment, UNUSED)
 
     def all(self) -> Sequence[Snapshot]:
+        """Every snapshot."""
         with self._lock:
             return list(self._snapshots.values())
 
     def latest(self, count: int) -> Sequence[Snapshot]:
+        """The `count` snapshots with the greatest reference times."""
         with self._lock:
             if count == 1 and self._snapshots:
                 return [self._snapshots.peekitem(-1)[1]]
             return self._slice(_last(len(self._snapshots), count))
 
     def before(self, moment: int, count: int) -> Sequence[Snapshot]:
+        """The `count` last snapshots strictly before `moment`."""
         with self._lock:
             return self._slice(_last(self._snapshots.bisect_left(moment), count))
 
     def after(self, moment: int, count: int) -> Sequence[Snapshot]:
+        """The `count` first snapshots strictly after `moment`."""
         with self._lock:
             begin = self._snapshots.bisect_right(moment)
             return self._slice(slice(begin, begin + count if count >= 0 else None))
 
     def between(self, begin: int, end: int) -> Sequence[Snapshot]:
+        """The snapshots from `begin` to `end`, both included."""
         with self._lock:
             return self._slice(slice(self._snapshots.bisect_left(begin), self._snapshots.bisect_right(end)))
 
     def at(self, moment: int) -> Snapshot | None:
+        """The snapshot with exactly this reference time."""
         found: Snapshot | None = self._snapshots.get(moment)
         return found
 
     def index_range(self, first: int, last: int) -> Sequence[Snapshot]:
+        """The snapshots from position `first` to `last`, both included."""
         with self._lock:
             return self._slice(index_slice(first, last, len(self._snapshots)))
 

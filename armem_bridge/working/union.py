@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 
 from armem_bridge.aron.type_objects import TypeObject
 from armem_bridge.memory_id import MemoryID
 from armem_bridge.working.history import History, Source, read_index_range
-from armem_bridge.working.snapshot import Snapshot, supersedes
+from armem_bridge.working.snapshot import Snapshot
+from armem_bridge.working.versions import last_of, what_counts
 
 
 class UnionSource:
@@ -22,16 +23,20 @@ class UnionSource:
         self._sources = sources
 
     def names(self, parent: MemoryID) -> Sequence[str]:
+        """The names one level below `parent` in any of the sources, in order."""
         return sorted({name for source in self._sources for name in source.names(parent)})
 
     def knows(self, name: MemoryID) -> bool:
+        """Whether any of the sources has this."""
         return any(source.knows(name) for source in self._sources)
 
     def segment_type(self, segment: MemoryID) -> TypeObject | None:
+        """The type of a segment in the first source that has one."""
         types = (source.segment_type(segment) for source in self._sources)
         return next((found for found in types if found is not None), None)
 
     def history(self, entity: MemoryID) -> History:
+        """The snapshots of an entity in all sources; of several versions of one that which counts."""
         return _UnionHistory([source.history(entity) for source in self._sources])
 
 
@@ -49,10 +54,10 @@ class _UnionHistory:
         return self._merged(lambda history: history.all())
 
     def latest(self, count: int) -> Sequence[Snapshot]:
-        return _last(self._merged(lambda history: history.latest(count)), count)
+        return last_of(self._merged(lambda history: history.latest(count)), count)
 
     def before(self, moment: int, count: int) -> Sequence[Snapshot]:
-        return _last(self._merged(lambda history: history.before(moment, count)), count)
+        return last_of(self._merged(lambda history: history.before(moment, count)), count)
 
     def after(self, moment: int, count: int) -> Sequence[Snapshot]:
         found = self._merged(lambda history: history.after(moment, count))
@@ -63,26 +68,10 @@ class _UnionHistory:
 
     def at(self, moment: int) -> Snapshot | None:
         found = [history.at(moment) for history in self._histories]
-        return next(iter(_merge([[each] for each in found if each is not None])), None)
+        return next(iter(what_counts(each for each in found if each is not None)), None)
 
     def index_range(self, first: int, last: int) -> Sequence[Snapshot]:
         return read_index_range(self, first, last)
 
     def _merged(self, ask: Callable[[History], Sequence[Snapshot]]) -> list[Snapshot]:
-        return _merge(ask(history) for history in self._histories)
-
-
-def _merge(parts: Iterable[Sequence[Snapshot]]) -> list[Snapshot]:
-    """Snapshots of one entity in order of time, one for each moment: of equal versions the first one found."""
-    found: dict[int, Snapshot] = {}
-    for part in parts:
-        for snapshot in part:
-            moment = snapshot.id.timestamp
-            known = found.get(moment)
-            if known is None or supersedes(snapshot, known):
-                found[moment] = snapshot
-    return [found[moment] for moment in sorted(found)]
-
-
-def _last(snapshots: list[Snapshot], count: int) -> list[Snapshot]:
-    return snapshots[max(len(snapshots) - count, 0) :] if count >= 0 else snapshots
+        return what_counts(snapshot for history in self._histories for snapshot in ask(history))

@@ -14,7 +14,7 @@ from armem_bridge.working.archive import Evicted
 from armem_bridge.working.history import History
 from armem_bridge.working.limits import HistoryLimits
 from armem_bridge.working.refusals import InvalidServer
-from armem_bridge.working.segments import CoreSegmentDefinition
+from armem_bridge.working.segments import CoreSegmentDefinition, why_no_segment_type
 from armem_bridge.working.snapshot import Snapshot
 from armem_bridge.working.sorted_history import SortedHistory
 from armem_bridge.working.tree import Memory
@@ -48,15 +48,21 @@ class WorkingMemory:
     def __init__(self, name: str, cores: Iterable[CoreSegmentDefinition], limits: HistoryLimits) -> None:
         self.id = MemoryID(memory=name)
         self.lock = Lock()
-        self.generation = 0
-        """Goes up whenever the type of a segment may have become another."""
         self._limits = limits
         self._cores: SortedDict = SortedDict()
         for definition in cores:
+            if not isinstance(definition, CoreSegmentDefinition):
+                raise InvalidServer(
+                    f"a core segment of the memory {name!r:.80} is a CoreSegmentDefinition, not {definition!r:.80}: "
+                    f"make a name one with CoreSegmentDefinition(name=...)"
+                )
             if not definition.name:
                 raise InvalidServer(f"a core segment of the memory {name!r:.80} has no name: give it one")
             if definition.name in self._cores:
                 raise InvalidServer(f"the memory {name!r:.80} has two core segments {definition.name!r:.80}: drop one")
+            wrong = why_no_segment_type(definition.aron_type)
+            if wrong:
+                raise InvalidServer(f"the core segment {definition.name!r:.80} of the memory {name!r:.80} {wrong}")
             self.id.with_core_segment(definition.name)
             self._cores[definition.name] = Core(definition.aron_type)
 
@@ -85,12 +91,10 @@ class WorkingMemory:
     def put_provider(self, core: str, name: str, provider: Provider) -> None:
         """Insert a provider segment, or put it in the place of the one of that name."""
         self._cores[core].providers[name] = provider
-        self.generation += 1
 
     def retype(self, provider: Provider, aron_type: TypeObject) -> None:
         """Give a provider segment another type."""
         provider.aron_type = aron_type
-        self.generation += 1
 
     def put(self, snapshot: Snapshot) -> list[Evicted]:
         """Insert a snapshot into an existing core segment, and say what left working memory for it."""
@@ -113,6 +117,15 @@ class WorkingMemory:
         entities.clear()
         return left
 
+    def held(self) -> list[Evicted]:
+        """What clients committed and is still here, as if it left now; of each entity the oldest first."""
+        with self.lock:
+            providers = [provider for core in self._cores.values() for provider in core.providers.values()]
+            histories = [
+                history for provider in providers if not provider.read_only for history in provider.entities.values()
+            ]
+            return [evicted for history in histories for evicted in history.held()]
+
     def note_use(self, result: Memory, now: int) -> None:
         """A query returned this: count it for the snapshots that are here."""
         for entity in result.entities():
@@ -123,6 +136,7 @@ class WorkingMemory:
     # Reading
 
     def names(self, parent: MemoryID) -> Sequence[str]:
+        """The names one level below `parent`, in order; none if unknown."""
         with self.lock:
             if not parent.core_segment:
                 return list(self._cores)
@@ -133,6 +147,7 @@ class WorkingMemory:
             return list(provider.entities) if provider is not None else ()
 
     def knows(self, name: MemoryID) -> bool:
+        """Whether there is such a core segment, provider segment or entity."""
         if name.entity:
             return self._history(name) is not None
         if name.provider_segment:
@@ -140,6 +155,7 @@ class WorkingMemory:
         return name.core_segment in self._cores
 
     def segment_type(self, segment: MemoryID) -> TypeObject | None:
+        """The type of a core or provider segment, where it has one of its own."""
         found = (
             self.provider(segment.core_segment, segment.provider_segment)
             if segment.provider_segment
@@ -148,6 +164,7 @@ class WorkingMemory:
         return found.aron_type if found is not None else None
 
     def history(self, entity: MemoryID) -> History:
+        """The snapshots of an entity, as they are at each question; of one that is not here, none."""
         return self._history(entity) or SortedHistory(self.lock, None)
 
     def usage(self, snapshot: MemoryID) -> Usage:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import logging
 import sys
 
 
 def main() -> None:
     """Run the command line of this process and exit with its code."""
+    # A command that ends tells its own reason: what the driver says of connections that it drops is no news.
+    logging.getLogger("psycopg").addHandler(logging.NullHandler())
     try:
         from elm.cli.program import app
 

@@ -12,7 +12,7 @@ from elm.cli.answers import RecordFormat, RecordOutput, record_format, write_rec
 from elm.cli.cue_options import CueOptions
 from elm.cli.memory_options import MemoryOptions
 from elm.cli.option_groups import takes_groups
-from elm.cli.terminal import answers, write
+from elm.cli.terminal import answers, visible, write
 
 if TYPE_CHECKING:
     from elm.recollector import GroupingName, Recollection
@@ -73,11 +73,15 @@ def stats(
 
 
 def _grouping(by: str) -> GroupingName:
+    from elm.errors import InvalidValue
     from elm.query import ByFeature, Grouping
 
     kind, colon, name = by.partition(":")
     if kind == "feature" and colon:
-        return ByFeature(name=name)
+        try:
+            return ByFeature(name=name)
+        except InvalidValue as error:
+            raise typer.BadParameter(visible(str(error)), param_hint="--by") from error
     if by not in {member.value for member in Grouping}:
         known = ", ".join(member.value for member in Grouping)
         raise typer.BadParameter(f"{by!r} is no key: choose one of {known}, feature:NAME", param_hint="--by")

@@ -14,9 +14,11 @@ from elm.cli.terminal import visible
 if TYPE_CHECKING:
     from elm.cues.algebra import Cue
     from elm.features import FeatureValue
+    from elm.geometry import Region
+    from elm.query import Nearest
 
 _POINT = 1e-3
-"""Radius in metres of the small polygon that stands for the point of --near."""
+"""Radius in metres of the small polygon that stands for a point."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,6 +50,14 @@ class CueOptions:
             help="Events whose observer was at most METRES from the point X,Y of FRAME (default: map).",
         ),
     ] = None
+    near_subject: Annotated[
+        str | None,
+        typer.Option(
+            "--near-subject",
+            metavar="X,Y,METRES[,FRAME]",
+            help="Events whose subject was at most METRES from the point X,Y of FRAME (default: map).",
+        ),
+    ] = None
     agent: Annotated[
         str | None, typer.Option("--agent", metavar="AGENT", help="Events from this agent's perspective.")
     ] = None
@@ -69,7 +79,8 @@ class CueOptions:
             ("--type", cues.exactly, self.exactly),
             *(("--is-a", cues.is_a, name) for name in self.is_a or ()),
             ("--since / --until", _between, (self.since, self.until) if self.since or self.until else None),
-            ("--near", _near, self.near),
+            ("--near", lambda given: cues.within(*_distance_and_point(given)), self.near),
+            ("--near-subject", lambda given: cues.subject_within(*_distance_and_point(given)), self.near_subject),
             ("--agent", cues.agent, self.agent),
             *(("--feature", _feature, pair) for pair in self.feature or ()),
         ]
@@ -108,19 +119,45 @@ def _between(times: tuple[str | None, str | None]) -> Cue:
     )
 
 
-def _near(given: str) -> Cue:
-    from elm import cues
-    from elm.errors import InvalidValue
-    from elm.geometry import DEFAULT_FRAME, Region
+def _distance_and_point(given: str) -> tuple[float, Region]:
+    (x, y, metres), frame = _numbers(given, "X,Y,METRES", like="3.5,-2,10")
+    return metres, _point(x, y, frame)
 
-    numbers, frame = given.split(",", 3), DEFAULT_FRAME
-    if len(numbers) == 4:
-        frame = numbers.pop()
+
+def nearest_to(given: str) -> Nearest:
+    """The order that --nearest X,Y[,FRAME] asks for."""
+    from elm.errors import InvalidValue
+    from elm.query import Nearest
+
     try:
-        x, y, metres = map(float, numbers)
-    except ValueError as error:
-        raise InvalidValue(f"a place is X,Y,METRES or X,Y,METRES,FRAME, like 3.5,-2,10: not {given!r}") from error
-    return cues.within(metres, Region.around(x, y, _POINT, frame=frame))
+        (x, y), frame = _numbers(given, "X,Y", like="3.5,-2")
+        return Nearest(to=_point(x, y, frame))
+    except InvalidValue as error:
+        raise typer.BadParameter(visible(str(error)), param_hint="--nearest") from error
+
+
+def _numbers(given: str, names: str, *, like: str) -> tuple[list[float], str]:
+    """The numbers that a text names, and the frame that may stand behind them."""
+    from elm.errors import InvalidValue
+    from elm.geometry import DEFAULT_FRAME
+
+    wanted = names.count(",") + 1
+    texts, frame = given.split(",", wanted), DEFAULT_FRAME
+    if len(texts) > wanted:
+        frame = texts.pop()
+    try:
+        numbers = [*map(float, texts)]
+    except ValueError:
+        numbers = []
+    if len(numbers) != wanted:
+        raise InvalidValue(f"a place is {names} or {names},FRAME, like {like}: not {given!r}")
+    return numbers, frame
+
+
+def _point(x: float, y: float, frame: str) -> Region:
+    from elm.geometry import Region
+
+    return Region.around(x, y, _POINT, frame=frame)
 
 
 def _feature(given: str) -> Cue:

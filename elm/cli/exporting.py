@@ -105,15 +105,28 @@ def _opened(to: Path | None) -> Iterator[BinaryIO]:
     if to is None:
         yield sys.stdout.buffer
     elif to.exists() and not to.is_file():
-        with to.open("wb") as device:
+        with _blamed(to), to.open("wb") as device:
             yield device
     else:
         target = to.resolve()
+        if not target.parent.is_dir():
+            raise typer.BadParameter(f"there is no directory {target.parent}: make it first", param_hint="--to")
         unfinished = target.with_name(f"{target.name}.part")
         try:
-            with unfinished.open("wb") as file:
+            with _blamed(to), unfinished.open("wb") as file:
                 yield file
             unfinished.replace(target)
         except BaseException:
             unfinished.unlink(missing_ok=True)
             raise
+
+
+@contextmanager
+def _blamed(file: Path) -> Iterator[None]:
+    """Errors of writing name the file that the user did: a full disk names none, and the unfinished one is ours."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno is None:
+            raise
+        raise OSError(error.errno, error.strerror, str(file)) from error

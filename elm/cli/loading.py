@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from threading import Event as Signal
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -12,6 +13,7 @@ from elm.cli.exits import ExitCode
 from elm.cli.memory_options import MemoryOptions
 from elm.cli.option_groups import takes_groups
 from elm.cli.sources import STDIN, opened, reads, size_of
+from elm.cli.stopping import set_by_signals
 from elm.cli.terminal import progress, say
 
 if TYPE_CHECKING:
@@ -33,13 +35,14 @@ def load(
 ) -> None:
     """Load events from JSON Lines; parts stand before their wholes, or are in the memory.
 
-    Lines that cannot be kept are set aside and named with the reason, the rest is loaded; exit code 1 then.
+    Lines that cannot be kept are set aside and named with the reason, the rest is loaded; exit code 1 then. Ctrl-C
+    ends it between two lines, and what was read is kept; exit code 130 then.
     """
     from elm.loading import load_stream
 
     name = "stdin" if file == STDIN else file
     refused_file = refused or Path(f"{name}.refused.jsonl")
-    reasons = _Reasons()
+    reasons, stop = _Reasons(), Signal()
     with (
         opened(file, hint="FILE") as stream,
         where.open() as memory,
@@ -47,9 +50,21 @@ def load(
     ):
         if reads(stream, refused_file):
             raise typer.BadParameter(f"{refused_file} is the file to load: name another", param_hint="--refused")
-        report = load_stream(memory.writer, stream, refused_file=refused_file, refused=reasons.tell, progress=done)
+        with set_by_signals(stop):
+            report = load_stream(
+                memory.writer,
+                stream,
+                refused_file=refused_file,
+                refused=reasons.tell,
+                progress=done,
+                stopped=stop.is_set,
+            )
     reasons.finish()
+    if stop.is_set():
+        say("stopped: lines behind those that were read are not loaded")
     _report(report, refused_file)
+    if stop.is_set():
+        raise typer.Exit(ExitCode.INTERRUPTED)
     if report.refused:
         raise typer.Exit(ExitCode.ERROR)
 

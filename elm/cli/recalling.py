@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from elm.cli.answers import Counted, EventFormat, EventOutput, event_format, write_events
-from elm.cli.cue_options import CueOptions
+from elm.cli.cue_options import CueOptions, nearest_to
 from elm.cli.exits import ExitCode
 from elm.cli.memory_options import MemoryOptions
 from elm.cli.option_groups import takes_groups
@@ -17,6 +17,7 @@ from elm.cli.terminal import say
 
 if TYPE_CHECKING:
     from elm.query import Cursor
+    from elm.recollector import OrderName
 
 TABLE_LIMIT = 100
 """Rows of a table unless asked otherwise."""
@@ -33,7 +34,18 @@ class RecallOrder(StrEnum):
 def recall(
     *,
     wanted: CueOptions,
-    order: Annotated[RecallOrder, typer.Option("--order", help="By begin, or the latest first.")] = RecallOrder.BEGIN,
+    order: Annotated[
+        RecallOrder | None,
+        typer.Option("--order", help="By begin (default), or the latest first.", show_default=False),
+    ] = None,
+    nearest: Annotated[
+        str | None,
+        typer.Option(
+            "--nearest",
+            metavar="X,Y[,FRAME]",
+            help="Instead of an order in time: those whose observer was nearest to the point X,Y of FRAME first.",
+        ),
+    ] = None,
     limit: Annotated[
         int | None,
         typer.Option("--limit", min=1, metavar="N", help=f"At most N events. Default: all; {TABLE_LIMIT} in a table."),
@@ -49,11 +61,14 @@ def recall(
 ) -> None:
     """Recall events by a cue; exit code 4 when nothing matches."""
     cue, cursor, form = wanted.read(), _cursor(after), event_format(output)
+    if nearest is not None and (order is not None or after is not None):
+        raise typer.BadParameter("the nearest come in no other order, and without --after", param_hint="--nearest")
+    wanted_order: OrderName = (order or RecallOrder.BEGIN).value if nearest is None else nearest_to(nearest)
     if explain:
         from elm.cli.explaining import write_explanation
 
         with where.open() as memory:
-            found = memory.recall(cue, order=order.value, limit=limit, after=cursor)
+            found = memory.recall(cue, order=wanted_order, limit=limit, after=cursor)
             write_explanation(found.explain(), form)
         return
     if limit is None and form is EventFormat.TABLE:
@@ -61,16 +76,18 @@ def recall(
     with where.open() as memory:
         # One more than asked for tells whether there are more.
         fetched = None if limit is None else limit + 1
-        stream = iter(memory.recall(cue, order=order.value, limit=fetched, after=cursor))
+        stream = iter(memory.recall(cue, order=wanted_order, limit=fetched, after=cursor))
         shown = Counted(islice(stream, limit))
         write_events(shown, form)
         if shown.last is None:
             say("nothing matched")
             raise typer.Exit(ExitCode.NOTHING_MATCHED)
         if limit is not None and next(stream, None) is not None:
-            total = f" of {memory.recall(cue).count():,}" if form is EventFormat.TABLE and cursor is None else ""
-            rest = f"--limit N for more, --after {_cursor_after(shown)} for the next"
-            say(f"{'first' if cursor is None else 'next'} {shown.count:,}{total}; {rest}")
+            total = ""
+            if form is EventFormat.TABLE and cursor is None:
+                total = f" of {memory.recall(cue, order=wanted_order).count():,}"
+            following = "" if nearest is not None else f", --after {_cursor_after(shown)} for the next"
+            say(f"{'first' if cursor is None else 'next'} {shown.count:,}{total}; --limit N for more{following}")
 
 
 def _cursor(after: str | None) -> Cursor | None:

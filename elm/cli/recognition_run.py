@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import logging
-import signal
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from threading import Event as Signal
 from threading import Thread
 from time import monotonic
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from elm.cli.stopping import set_by_signals, warnings_said
 from elm.cli.terminal import progress, remarks, say
 from elm.errors import DatabaseUnreachable, ElmError, MemoryMissing
 
@@ -27,7 +26,7 @@ TELL_EVERY = 60.0
 
 def run_once(manager: RecognitionManager) -> bool:
     """Deal with what the log holds; whether no recognizer failed."""
-    with _warnings_said(), progress("recognizing", total=None, unit=""):
+    with warnings_said("elm"), progress("recognizing", total=None, unit=""):
         manager.catch_up()
     say(_told(manager))
     return not any(each.is_failing for each in manager.status())
@@ -41,7 +40,7 @@ def run_until_stopped(memory: Memory, manager: RecognitionManager) -> None:
     stop, broke = Signal(), list[Exception]()
     work = Thread(target=_work, args=(manager, stop, broke), name="recognition", daemon=True)
     what = f"recognizing in memory {memory.name!r} as {manager.consumer!r}"
-    with _warnings_said(), _set_by_signals(stop), _shown(what) as show:
+    with warnings_said("elm"), set_by_signals(stop), _shown(what) as show:
         work.start()
         work.join(LOOK_EVERY)
         while work.is_alive():
@@ -71,24 +70,11 @@ def _told(manager: RecognitionManager) -> str:
     head = max((each.position + each.lag for each in found), default=0)
     failing = [each.name for each in found if each.is_failing]
     told = [f"position {position:,} of {head:,}", f"{sum(each.found for each in found):,} complex events so far"]
-    return ", ".join([*told, *([f"failing: {' '.join(failing)}"] if failing else [])])
-
-
-@contextmanager
-def _set_by_signals(stop: Signal) -> Iterator[None]:
-    """Have SIGINT and SIGTERM set `stop`; a second one does what it does without elm."""
-
-    def ask(number: int, frame: Any) -> None:
-        stop.set()
-        for each in before:
-            signal.signal(each, signal.SIG_DFL)
-
-    before = {each: signal.signal(each, ask) for each in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+    if late := [f"{each.late:,} for {each.name}" for each in found if each.late]:
+        told.append(f"too late: {', '.join(late)}")
+    if failing:
+        told.append(f"failing: {' '.join(failing)}")
+    return ", ".join(told)
 
 
 @contextmanager
@@ -109,21 +95,3 @@ def _shown(what: str) -> Iterator[Callable[[str], None]]:
             said, due = told, monotonic() + TELL_EVERY
 
     yield tell
-
-
-class _Said(logging.Handler):
-    """What elm warns of while it works, as a line on stderr."""
-
-    def emit(self, record: logging.LogRecord) -> None:
-        """Say it."""
-        say(f"elm: {record.getMessage()}")
-
-
-@contextmanager
-def _warnings_said() -> Iterator[None]:
-    handler, logger = _Said(), logging.getLogger("elm")
-    logger.addHandler(handler)
-    try:
-        yield
-    finally:
-        logger.removeHandler(handler)

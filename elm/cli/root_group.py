@@ -32,6 +32,9 @@ class RootGroup(TyperGroup):
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             raise typer.Exit(ExitCode.BROKEN_PIPE) from None
         except Exception as error:
+            if isinstance(error, typer.BadParameter):
+                # What reads the options for typer says so of every value.
+                error.message = error.message.removeprefix("Value error, ")
             # Typer's own (wrong usage, an exit that is asked for) know how to end.
             if hasattr(error, "exit_code") or isinstance(error, typer.Abort):
                 raise

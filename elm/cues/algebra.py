@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from datetime import timedelta
+from typing import Never, TypeGuard
 from uuid import UUID
 
+from elm.arguments import as_uids, check_several
 from elm.cues.relations import Comparison, Kin, Place, SetRelation, TimeAxis, TypeRelation, named, time_relation
 from elm.errors import InvalidValue
 from elm.features import Feature, FeatureValue, as_features, check_value, kind_of
@@ -37,9 +39,17 @@ class Cue:
     def __invert__(self) -> Not:
         return Not(arg=self)
 
+    def __bool__(self) -> Never:
+        raise InvalidValue("a cue is neither true nor false: combine cues with &, | and ~, not with and, or, not")
+
+
+def is_cue(given: object) -> TypeGuard[Cue]:
+    """Whether `given` is a cue, which the base of all cues alone is not."""
+    return isinstance(given, Cue) and type(given) is not Cue
+
 
 def _cue(given: object) -> Cue:
-    if not isinstance(given, Cue):
+    if not is_cue(given):
         raise InvalidValue(f"a cue combines with cues, not with {given!r:.80}")
     return given
 
@@ -59,7 +69,8 @@ class And(Cue):
     depth: int = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        flat = [part for arg in self.args for part in (arg.args if isinstance(arg, And) else (_cue(arg),))]
+        args = check_several(self.args, what="the arguments of and")
+        flat = [part for arg in args for part in (arg.args if isinstance(arg, And) else (_cue(arg),))]
         object.__setattr__(self, "args", tuple(flat))
         object.__setattr__(self, "depth", _deeper(flat))
 
@@ -72,7 +83,8 @@ class Or(Cue):
     depth: int = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        flat = [part for arg in self.args for part in (arg.args if isinstance(arg, Or) else (_cue(arg),))]
+        args = check_several(self.args, what="the arguments of or")
+        flat = [part for arg in args for part in (arg.args if isinstance(arg, Or) else (_cue(arg),))]
         object.__setattr__(self, "args", tuple(flat))
         object.__setattr__(self, "depth", _deeper(flat))
 
@@ -138,10 +150,12 @@ class RegionCue(Cue):
         object.__setattr__(self, "relation", relation)
         object.__setattr__(self, "place", named(self.place, Place, what="the place of a region cue"))
         if not isinstance(self.region, Region):
-            raise InvalidValue(f"a region cue compares with a Region, not with {self.region!r:.80}")
+            raise InvalidValue(f"a region cue compares with a Region(polygon=...), not with {self.region!r:.80}")
         if relation is SpatialRelation.WITHIN_DISTANCE:
             if isinstance(self.distance, bool) or not isinstance(self.distance, int | float):
-                raise InvalidValue("within_distance needs a distance in metres")
+                raise InvalidValue(
+                    f"within_distance needs a distance in metres (int or float), not {self.distance!r:.80}"
+                )
             if not 0 <= self.distance <= LIMIT:
                 raise InvalidValue(f"the distance must be between 0 and {LIMIT:g} m, not {self.distance!r}")
             object.__setattr__(self, "distance", float(self.distance))
@@ -172,9 +186,8 @@ class FeatureNamesCue(Cue):
     def __post_init__(self) -> None:
         relation = named(self.relation, SetRelation, what="the relation of a feature names cue")
         object.__setattr__(self, "relation", relation)
-        if isinstance(self.names, str):
-            raise InvalidValue(f"feature names are given as several, not as one text: [{self.names!r}]")
-        names = dict.fromkeys(check_name(name, what="a feature name of a cue") for name in self.names)
+        several = check_several(self.names, what="feature names")
+        names = dict.fromkeys(check_name(name, what="a feature name of a cue") for name in several)
         object.__setattr__(self, "names", tuple(names))
 
 
@@ -272,11 +285,7 @@ class UidCue(Cue):
 
 
 def _uids(given: Iterable[UUID]) -> tuple[UUID, ...]:
-    uids = tuple(dict.fromkeys(given))
-    for uid in uids:
-        if not isinstance(uid, UUID):
-            raise InvalidValue(f"events are named by their uid (uuid.UUID), not by {uid!r:.80}")
-    return uids
+    return tuple(dict.fromkeys(as_uids(given, what="the uids of a cue")))
 
 
 Condition = (

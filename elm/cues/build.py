@@ -1,4 +1,4 @@
-"""Short ways to write cues in Python: `is_a("Row") & within(5.0, beacon) & during(begin, end)`."""
+"""Short ways to write cues in Python: `is_a("Row") & within(5.0, beacon) & time("during", begin, end)`."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from datetime import datetime, timedelta
 from typing import Literal
 from uuid import UUID
 
+from elm.arguments import as_uids, check_several
 from elm.cues.algebra import (
     AgentCue,
     And,
@@ -82,8 +83,13 @@ def time(
     begin: datetime | Interval | None = None,
     end: datetime | None = None,
 ) -> Cue:
-    """Events whose interval stands in `relation` to [begin, end]; None is unbounded; an Interval gives both."""
-    return TimeCue(relation=_time_relation(relation), window=_window(begin, end))
+    """Events whose interval stands in `relation` to [begin, end]; None is unbounded; an Interval gives both.
+
+    `before`, `after`, `meets` and `met_by` compare with one moment as well: where only one is given, in either place,
+    it is both begin and end.
+    """
+    known = _time_relation(relation)
+    return TimeCue(relation=known, window=_window(known, begin, end))
 
 
 def recorded(
@@ -91,8 +97,9 @@ def recorded(
     begin: datetime | Interval | None = None,
     end: datetime | None = None,
 ) -> Cue:
-    """Events that the memory learned of at an instant in `relation` to [begin, end]."""
-    return TimeCue(relation=_time_relation(relation), window=_window(begin, end), axis=TimeAxis.RECORDED_AT)
+    """Events that the memory learned of at an instant in `relation` to [begin, end], which are as those of `time`."""
+    known = _time_relation(relation)
+    return TimeCue(relation=known, window=_window(known, begin, end), axis=TimeAxis.RECORDED_AT)
 
 
 def region(relation: PlaceName, place: Region) -> Cue:
@@ -122,7 +129,7 @@ def features(relation: SetName, given: Mapping[str, object] | Iterable[tuple[str
 
 def feature_names(relation: SetName, names: Iterable[str]) -> Cue:
     """Events whose set of feature names stands in `relation` to the given one."""
-    return FeatureNamesCue(relation=_set_relation(relation), names=_several(names))
+    return FeatureNamesCue(relation=_set_relation(relation), names=tuple(check_several(names, what="feature names")))
 
 
 def feature(name: str, compare: CompareName, value: FeatureValue) -> Cue:
@@ -145,24 +152,39 @@ def lasting(compare: CompareName, duration: timedelta) -> Cue:
     return DurationCue(compare=_comparison(compare), duration=duration)
 
 
-def parts(relation: SetName, uids: Iterable[UUID], *, transitive: bool = False) -> Cue:
+def parts(relation: SetName, uids: Iterable[UUID | str], *, transitive: bool = False) -> Cue:
     """Events whose sub-events stand in `relation` to the given ones."""
-    return KinCue(relation=_set_relation(relation), uids=tuple(uids), kin=Kin.PARTS, transitive=transitive)
+    return KinCue(relation=_set_relation(relation), uids=_uids(uids), kin=Kin.PARTS, transitive=transitive)
 
 
-def wholes(relation: SetName, uids: Iterable[UUID], *, transitive: bool = False) -> Cue:
+def wholes(relation: SetName, uids: Iterable[UUID | str], *, transitive: bool = False) -> Cue:
     """Events whose super-events stand in `relation` to the given ones."""
-    return KinCue(relation=_set_relation(relation), uids=tuple(uids), kin=Kin.WHOLES, transitive=transitive)
+    return KinCue(relation=_set_relation(relation), uids=_uids(uids), kin=Kin.WHOLES, transitive=transitive)
 
 
-def uid(*uids: UUID) -> Cue:
+def uid(*uids: UUID | str) -> Cue:
     """Exactly these events."""
-    return UidCue(uids=uids)
+    for each in uids:
+        if isinstance(each, Iterable) and not isinstance(each, str):
+            raise InvalidValue(
+                f"uids are given one after the other, as uid(one, two) or uid(*several), not {each!r:.80}"
+            )
+    return UidCue(uids=_uids(uids))
 
 
-def _window(begin: datetime | Interval | None, end: datetime | None) -> Window:
+_OF_A_MOMENT = frozenset({AllenRelation.BEFORE, AllenRelation.AFTER, AllenRelation.MEETS, AllenRelation.MET_BY})
+"""Relations that look at one end of the window: unbounded there, it is in them to no event."""
+
+
+def _window(relation: SetRelation | AllenRelation, begin: datetime | Interval | None, end: datetime | None) -> Window:
     if isinstance(begin, Interval):
+        if end is not None:
+            raise InvalidValue(f"{begin} has an end: give an interval, or begin and end, not {end!r} beside it")
         return Window.of(begin)
+    if isinstance(begin, tuple | list):
+        raise InvalidValue(f"begin and end are given one after the other, or as one Interval, not as {begin!r:.80}")
+    if relation in _OF_A_MOMENT:
+        return Window(begin=end if begin is None else begin, end=begin if end is None else end)
     return Window(begin=begin, end=end)
 
 
@@ -182,7 +204,5 @@ def _comparison(given: str) -> Comparison:
     return named(given, Comparison, what="a comparison")
 
 
-def _several(names: Iterable[str]) -> tuple[str, ...]:
-    if isinstance(names, str):
-        raise InvalidValue(f"feature names are given as several, not as one text: [{names!r}]")
-    return tuple(names)
+def _uids(given: Iterable[UUID | str]) -> tuple[UUID, ...]:
+    return as_uids(given, what="the uids of a cue")

@@ -29,7 +29,7 @@ from elm.cues.algebra import (
 from elm.cues.relations import Comparison, Kin, Place, SetRelation, TimeAxis, TypeRelation, named, time_relation
 from elm.errors import InvalidValue
 from elm.features import as_features
-from elm.fields import Fields, base64_text, time_text
+from elm.fields import Fields, base64_text, shown, time_text
 from elm.geometry import Region, SpatialRelation
 from elm.interval import Window, parse_time
 
@@ -158,11 +158,11 @@ def _duration(fields: Fields) -> Cue:
     seconds = fields.number("seconds")
     micros = 0 if fields.optional("microseconds") is None else fields.number("microseconds")
     if not isinstance(micros, int):
-        raise InvalidValue(f"{fields.what_of('microseconds')} must be a whole number, not {micros!r}")
+        raise InvalidValue(f"{fields.what_of('microseconds')} must be a whole number, not {shown(micros)}")
     try:
         duration = timedelta(seconds=seconds) + timedelta(microseconds=micros)
     except (OverflowError, ValueError) as error:
-        raise InvalidValue(f"{fields.what_of('seconds')} is out of range: {seconds!r}") from error
+        raise InvalidValue(f"{fields.what_of('seconds')} is out of range: {shown(seconds)}") from error
     return DurationCue(compare=compare, duration=duration)
 
 

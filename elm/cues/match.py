@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import operator
-import re
-from collections.abc import Callable, Mapping, Set
+from collections.abc import Callable, Mapping, Sequence, Set
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import dropwhile, takewhile
 from types import MappingProxyType
 from typing import Any, Protocol, assert_never
 from uuid import UUID
@@ -153,7 +155,7 @@ COMPARE: Mapping[Comparison, Callable[[Any, Any], bool]] = MappingProxyType(
         Comparison.LE: operator.le,
         Comparison.GT: operator.gt,
         Comparison.GE: operator.ge,
-        Comparison.LIKE: lambda text, pattern: like_pattern(pattern).fullmatch(text) is not None,
+        Comparison.LIKE: lambda text, pattern: _like(text, pattern),
     }
 )
 
@@ -165,8 +167,97 @@ def _feature(cue: FeatureCue, event: StoredEvent) -> bool:
     )
 
 
-def like_pattern(pattern: str) -> re.Pattern[str]:
-    """SQL's LIKE as a regular expression: % any text, _ one character, backslash makes the next one plain."""
-    pieces = re.findall(r"\\.|[^\\]", pattern, flags=re.DOTALL)
-    wild = {"%": ".*", "_": "."}
-    return re.compile("".join(wild.get(piece, re.escape(piece[-1])) for piece in pieces), flags=re.DOTALL)
+def _like(text: str, pattern: str) -> bool:
+    """SQL's LIKE, of the whole text: % is any text, _ one character, backslash makes the next one plain.
+
+    What stands between two % is looked for from left to right, each piece where it fits first: no later place would
+    leave more room for the rest. So nothing is tried twice, and no pattern takes long.
+    """
+    first, *others = _pieces(pattern)
+    if not others:
+        return len(text) == first.length and first.fits(text, 0)
+    *inner, last = others
+    if len(text) < first.length + last.length or not first.fits(text, 0):
+        return False
+    behind, end = first.length, len(text) - last.length
+    for piece in inner:
+        behind = piece.end_of_first_fit(text, behind, end)
+        if behind < 0:
+            return False
+    return behind <= end and last.fits(text, end)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Piece:
+    """What stands between two % of a pattern: `lead` places for any character, and behind them a core.
+
+    The core is the text `plain` where all its characters are given. Else `plain` is None, `head` the text before its
+    first place for any; `places` has, for each character given, where in the core it may stand, as the bits of a
+    number, and `anywhere` where any other may.
+    """
+
+    length: int
+    lead: int
+    plain: str | None
+    head: str
+    places: Mapping[str, int]
+    anywhere: int
+
+    @classmethod
+    def of(cls, characters: Sequence[str | None]) -> _Piece:
+        core = list(dropwhile(lambda character: character is None, characters))
+        head = "".join(character or "" for character in takewhile(lambda character: character is not None, core))
+        anywhere = sum(1 << place for place, character in enumerate(core) if character is None)
+        places: dict[str, int] = {}
+        for place, character in enumerate(core):
+            if character is not None:
+                places[character] = places.get(character, anywhere) | 1 << place
+        return cls(
+            length=len(characters),
+            lead=len(characters) - len(core),
+            plain=head if len(head) == len(core) else None,
+            head=head,
+            places=places,
+            anywhere=anywhere,
+        )
+
+    def fits(self, text: str, begin: int) -> bool:
+        if self.plain is not None:
+            return text.startswith(self.plain, begin + self.lead)
+        return self.end_of_first_fit(text, begin, begin + self.length) >= 0
+
+    def end_of_first_fit(self, text: str, begin: int, end: int) -> int:
+        """Where the first place ends at which the piece stands in text[begin:end], or -1."""
+        place = begin + self.lead
+        if self.plain is not None:
+            found = text.find(self.plain, place, end)
+            return found if found < 0 else found + len(self.plain)
+        # Shift-and (Baeza-Yates and Gonnet 1992); bit n: the core up to its place n ends here.
+        standing, whole = 0, 1 << (self.length - self.lead - 1)
+        while place < end:
+            if not standing:
+                place = text.find(self.head, place, end)
+                if place < 0:
+                    return -1
+            standing = (standing << 1 | 1) & self.places.get(text[place], self.anywhere)
+            place += 1
+            if standing & whole:
+                return place
+        return -1
+
+
+@lru_cache(maxsize=64)
+def _pieces(pattern: str) -> tuple[_Piece, ...]:
+    """The pattern, taken apart at its %; a cue has none that ends with a single backslash."""
+    pieces: list[list[str | None]] = [[]]
+    characters = iter(pattern)
+    for character in characters:
+        if character == "%":
+            pieces.append([])
+        elif character == "_":
+            pieces[-1].append(None)
+        elif character == "\\":
+            pieces[-1].append(next(characters))
+        else:
+            pieces[-1].append(character)
+    return tuple(map(_Piece.of, pieces))

@@ -62,15 +62,18 @@ class Kin(StrEnum):
 _Name = TypeVar("_Name", bound=StrEnum)
 
 
-def named(given: object, *kinds: type[_Name], what: str) -> _Name:
-    """The member of `kinds` that `given` is or names; anything else is refused, listing what there is."""
+def named(given: object, *kinds: type[_Name], what: str, also: str = "") -> _Name:
+    """The member of `kinds` that `given` is or names; anything else is refused, listing what there is.
+
+    `also` names what the caller takes beside them.
+    """
     for kind in kinds:
         if isinstance(given, kind):
             return given
         if isinstance(given, str) and given in {member.value for member in kind}:
             return kind(given)
     known = ", ".join(member.value for kind in kinds for member in kind)
-    raise InvalidValue(f"{what} cannot be {given!r}: choose one of {known}")
+    raise InvalidValue(f"{what} cannot be {given!r:.80}: choose one of {known}{also}")
 
 
 def time_relation(given: object, *, what: str) -> SetRelation | AllenRelation:

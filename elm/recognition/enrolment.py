@@ -10,9 +10,19 @@ from elm.cues.codec import cue_from_json
 from elm.errors import DefinitionChanged, InvalidValue, UnknownType
 from elm.log import LoggedStore
 from elm.recognition.clocks import Timing
+from elm.recognition.reports import StrandReport
 from elm.recognition.strands import Strand, strands
 from elm.recognizers.base import Judge, Recognizer
 from elm.recognizers.purity import check_pure
+
+
+def check_recognizers(recognizers: Sequence[Recognizer]) -> None:
+    """Refuse what is no list of recognizers, or an empty one."""
+    if isinstance(recognizers, str) or not isinstance(recognizers, Sequence) or not recognizers:
+        raise InvalidValue(f"recognition needs a list of recognizers, at least one, not {recognizers!r:.80}")
+    for each in recognizers:
+        if isinstance(each, type) or not isinstance(each, Recognizer):
+            raise InvalidValue(f"this is no recognizer (see elm.recognizers.Recognizer): {each!r:.80}")
 
 
 def enrolled(
@@ -70,12 +80,12 @@ def _refuse_rings(store: LoggedStore, recognizers: Sequence[Recognizer], consume
         _Member(each.name, consumer, each.interest, tuple(output.name for output in each.outputs))
         for each in recognizers
     ]
-    for other in store.log.consumers():
-        owner = other.report.get("consumer")
-        if owner is not None and owner != consumer:
+    for other in store.log.progress():
+        report = StrandReport.of(other)
+        if report is not None and report.consumer != consumer:
             known += [
-                _Member(told["name"], owner, cue_from_json(told["interest"]), tuple(told["outputs"]))
-                for told in other.report["recognizers"]
+                _Member(told.name, report.consumer, cue_from_json(told.interest), told.outputs)
+                for told in report.recognizers
             ]
     feeds = [
         {

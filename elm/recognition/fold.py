@@ -9,11 +9,11 @@ from typing import Any, TypeVar
 from uuid import UUID
 
 from elm.event import StoredEvent
-from elm.interval import from_micros
 from elm.log import LogEntry, LogKind, Tick
 from elm.recognition.bench import RecognizerFailure
 from elm.recognition.clocks import NEVER, Clocks, Timing
 from elm.recognition.results import Result, moment_of
+from elm.recognition.ticking import deadlines, due_ticks
 from elm.recognition.waiting import Queue, Waiting, fed_at, keep, merge, push
 from elm.recognition.work import Work
 from elm.recognizers.base import RECOGNIZER, Fed
@@ -22,7 +22,7 @@ T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Taken:
+class Harvest:
     """What a stretch of the log brought about: results by strand, in the order of detection, and failures."""
 
     results: tuple[tuple[str, Result], ...]
@@ -49,10 +49,12 @@ class Fold:
         self._moved: dict[str | None, None] = {}
         self._has_across = any(each.has_across for each in works)
         self._complete = complete
+        self.last_late: tuple[str | None, int] | None = None
+        """The agent of the last event that came too late, and by how many microseconds."""
 
     # Taking entries in
 
-    def take(self, entries: Iterable[LogEntry]) -> Taken:
+    def take(self, entries: Iterable[LogEntry]) -> Harvest:
         """Take in entries; what is found does not depend on how they are divided into calls."""
         for entry in entries:
             self._take(entry)
@@ -66,27 +68,26 @@ class Fold:
             self._settle()
         return self._told()
 
-    def finish(self) -> Taken:
+    def finish(self) -> Harvest:
         """Feed all that has come of age by now."""
         self._moved.update(dict.fromkeys(self.clocks.agents))
         self._settle()
         return self._told()
 
-    def _told(self) -> Taken:
-        taken = Taken(results=tuple(self._results), failures=tuple(self._failures))
+    def _told(self) -> Harvest:
+        results, failures = self._results, tuple(self._failures)
         self._results, self._failures = [], []
-        failed = {name for name, _ in taken.failures}
-        return Taken(
-            results=tuple((name, result) for name, result in taken.results if name not in failed),
-            failures=taken.failures,
-        )
+        failed = {name for name, _ in failures}
+        kept = tuple((name, result) for name, result in results if name not in failed)
+        return Harvest(results=kept, failures=failures)
 
     def _take(self, entry: LogEntry) -> None:
         event = entry.event
         if event is None or entry.kind not in (LogKind.COMMIT, LogKind.CLOSE):
             self.clocks.tell(entry, None)
             if entry.is_forgotten:
-                _count_forgotten(self.works.values())
+                for work in self.works.values():
+                    work.tally.forgotten += 1
             return
         end = moment_of(event)
         before, shared = self.clocks.watermark(entry.agent), self.clocks.shared
@@ -107,20 +108,27 @@ class Fold:
         else:
             moment_across = moment
         if moment < before and not self._complete:
-            _count_late(single)
+            self._pass_by(single, agent, before - moment)
         elif not self._has_room(self._waiting.setdefault(agent, Waiting([])), moment, before):
-            _count_passed_over(single)
+            for work in single:
+                work.tally.passed_over += 1
         elif single and (not is_result or agent in self.clocks.agents):
             # What another consumer found across agents belongs to none whose time could come.
             push(self._queues.setdefault(agent, []), event, moment)
         if not self._has_across:
             return
         if moment_across < shared and not self._complete:
-            _count_late(across)
+            self._pass_by(across, agent, shared - moment_across)
         elif not self._has_room(self._waiting_across, moment_across, shared):
-            _count_passed_over(across)
+            for work in across:
+                work.tally.passed_over += 1
         elif across:
             push(self._shared, event, moment_across)
+
+    def _pass_by(self, works: Sequence[Work], agent: str | None, behind: int) -> None:
+        for work in works:
+            work.tally.late += 1
+            self.last_late = (agent, behind)
 
     def _has_room(self, waiting: Waiting, moment: int, watermark: int) -> bool:
         return self._complete or waiting.has_room(moment, watermark)
@@ -201,39 +209,13 @@ class Fold:
 
     def ticks(self, now: int) -> tuple[list[Tick], int | None]:
         """The ticks that would make something certain if written `now`, and when the next one would be due."""
-        found: list[Tick] = []
-        later: list[int] = []
-        if self.clocks.timing.simulated:
-            return found, None
-        lateness, awake, across = self.clocks.lateness, self.clocks.awake(), self._waits_across()
-        for agent, clock in self.clocks.agents.items():
-            waiting = self._waits_for(agent) + (across if agent in awake else [])
-            waits = sorted(moment + lateness + 1 for moment in waiting if moment + lateness >= clock.time)
-            reach = clock.after(now)
-            due = [moment for moment in waits if moment <= reach]
-            if due:
-                found.append(Tick(agent=agent, deadline=from_micros(due[-1])))
-            if len(due) < len(waits):
-                later.append(now + waits[len(due)] - reach)
-            if across and len(awake) > 1 and agent in awake:
-                # It holds others up until it is idle, which the log must tell: by a tick that moves no clock.
-                if (until_idle := self.clocks.idle_after(clock)) >= now:
-                    later.append(until_idle + 1)
-                elif not due:
-                    found.append(Tick(agent=agent, deadline=from_micros(clock.time)))
-        return found, min(later, default=None)
+        benches = [work.across for work in self.works.values() if work.has_across]
+        across = [item[0] for item in self._shared] + deadlines(benches)
+        return due_ticks(self.clocks, self._waits_for, across, now)
 
     def _waits_for(self, agent: str | None) -> list[int]:
-        moments = [item[0] for item in self._queues.get(agent, ())]
-        for work in self.works.values():
-            bench = work.benches.get(agent)
-            if bench is not None and (deadline := bench.next_deadline()) is not None:
-                moments.append(deadline)
-        return moments
-
-    def _waits_across(self) -> list[int]:
-        deadlines = [work.across.next_deadline() for work in self.works.values() if work.has_across]
-        return [item[0] for item in self._shared] + [each for each in deadlines if each is not None]
+        benches = [bench for work in self.works.values() if (bench := work.benches.get(agent)) is not None]
+        return [item[0] for item in self._queues.get(agent, ())] + deadlines(benches)
 
     # What is kept
 
@@ -309,18 +291,3 @@ class Fold:
         for agent, queue in other._queues.items():
             merge(self._queues.setdefault(agent, []), queue)
         merge(self._shared, other._shared)
-
-
-def _count_late(works: Iterable[Work]) -> None:
-    for work in works:
-        work.tally.late += 1
-
-
-def _count_forgotten(works: Iterable[Work]) -> None:
-    for work in works:
-        work.tally.forgotten += 1
-
-
-def _count_passed_over(works: Iterable[Work]) -> None:
-    for work in works:
-        work.tally.passed_over += 1

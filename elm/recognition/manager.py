@@ -3,28 +3,26 @@
 from __future__ import annotations
 
 import logging
-import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from threading import Condition, Thread
 from threading import Event as Signal
-from threading import Thread
 from typing import Self
 
 from elm.errors import DatabaseUnreachable, InvalidValue, PositionLost, StoreClosed, UnknownConsumer
 from elm.log import LoggedStore
 from elm.recognition.clocks import Timing
-from elm.recognition.enrolment import enrolled
+from elm.recognition.enrolment import check_recognizers, enrolled
 from elm.recognition.judging import TypeJudge
+from elm.recognition.reports import Failures
 from elm.recognition.shift import RETRY_FIRST, RETRY_MOST, Orders, Shift
-from elm.recognition.status import Failures, RecognizerStatus, status
+from elm.recognition.status import RecognizerStatus, status
 from elm.recognizers.base import Recognizer
 from elm.text import check_short_name
 
 BATCH = 2_000
 """Entries of the log that are dealt with in one transaction."""
-NAP = 0.005
-"""Seconds between two looks at how far the thread is."""
 
 log = logging.getLogger(__name__)
 
@@ -53,7 +51,7 @@ class RecognitionManager:
         self.timing = Timing() if timing is None else timing
         if not isinstance(self.timing, Timing):
             raise InvalidValue(f"timing is given as Timing(lateness=..., idle=...), not {timing!r:.80}")
-        _check_recognizers(recognizers)
+        check_recognizers(recognizers)
         if isinstance(batch, bool) or not isinstance(batch, int) or batch < 1:
             raise InvalidValue(f"a batch has at least one entry, not {batch!r}")
         self._store = store
@@ -64,7 +62,12 @@ class RecognitionManager:
         self._orders: Orders | None = None
         self._failures: dict[str, Failures] = {}
         self._stop = Signal()
+        self._began = Signal()
+        """Set when the thread has got its name, waits for a server that is away, or has ended."""
         self._thread: Thread | None = None
+        self._went_on = Condition()
+        """Told when a round is over or has failed, and when the thread ends."""
+        self._is_running = False
         self._broke: BaseException | None = None
 
     # Running
@@ -91,33 +94,43 @@ class RecognitionManager:
             try:
                 with self._shift() as shift, ThreadPoolExecutor(thread_name_prefix=f"elm {self.consumer}") as pool:
                     while not asked.is_set():
-                        if shift.round(pool) == 0:
+                        done = shift.round(pool)
+                        self._tell_who_waits()
+                        if done == 0:
                             shift.wait(asked)
                         pause = RETRY_FIRST
             except (DatabaseUnreachable, PositionLost, UnknownConsumer) as error:
                 # The server is away, or somebody rewound a consumer: it goes on from what is committed.
+                self._began.set()
                 log.warning("recognition %r begins anew where it was, when it can: %s", self.consumer, error)
+                self._tell_who_waits()
                 asked.wait(pause)
                 pause = min(2 * pause, RETRY_MOST)
 
     def start(self) -> None:
-        """Work in a thread of this process until `stop()`."""
+        """Work in a thread of this process until `stop()`; `ConsumerBusy` when another works under this name."""
         if self._thread is not None:
             raise InvalidValue("this manager is running already: stop it before starting it again")
         self._stop.clear()
+        self._began.clear()
         self._broke = None
         self._enrol()
+        self._is_running = True
         self._thread = Thread(target=self._run_guarded, name=f"elm {self.consumer}", daemon=True)
         self._thread.start()
+        self._began.wait()
+        if self._broke is not None:
+            self.stop()
 
     def stop(self) -> None:
-        """End the thread after the batch it is at, however long a call takes; what broke it is raised here."""
+        """End the thread after the batch it is at, however long a call takes; what broke it is raised here, once."""
         self._stop.set()
         if self._thread is not None:
             self._thread.join()
             self._thread = None
-        if self._broke is not None:
-            raise self._broke
+        broke, self._broke = self._broke, None
+        if broke is not None:
+            raise broke
 
     def __enter__(self) -> Self:
         self.start()
@@ -126,8 +139,10 @@ class RecognitionManager:
     def __exit__(self, *error: object) -> None:
         """Deal with what was committed until now, and stop."""
         head = self._store.log.head()
-        while self._thread is not None and self._thread.is_alive() and self._is_behind(head):
-            time.sleep(NAP)
+        with self._went_on:
+            # Looked at under the lock: what is committed after the look is told of after it, too.
+            while self._is_running and self._is_behind(head):
+                self._went_on.wait()
         self.stop()
 
     def _is_behind(self, head: int) -> bool:
@@ -144,8 +159,18 @@ class RecognitionManager:
         except StoreClosed:
             log.info("recognition %r ends: the memory was closed", self.consumer)
         except BaseException as error:
-            log.exception("recognition %r stopped", self.consumer)
             self._broke = error
+            # Before that, it is `start` that raises it.
+            if self._began.is_set():
+                log.exception("recognition %r stopped", self.consumer)
+        finally:
+            self._is_running = False
+            self._began.set()
+            self._tell_who_waits()
+
+    def _tell_who_waits(self) -> None:
+        with self._went_on:
+            self._went_on.notify_all()
 
     def _enrol(self) -> Orders:
         """See to types and definitions, the first time; what is to be done."""
@@ -165,12 +190,5 @@ class RecognitionManager:
     def _shift(self) -> Iterator[Shift]:
         orders = self._enrol()
         with self._store.log.exclusive(self.consumer):
+            self._began.set()
             yield Shift(self._store, orders, self._judge, self._failures)
-
-
-def _check_recognizers(recognizers: Sequence[Recognizer]) -> None:
-    if isinstance(recognizers, str) or not isinstance(recognizers, Sequence) or not recognizers:
-        raise InvalidValue(f"recognition needs a list of recognizers, at least one, not {recognizers!r:.80}")
-    for each in recognizers:
-        if isinstance(each, type) or not isinstance(each, Recognizer):
-            raise InvalidValue(f"this is no recognizer (see elm.recognizers.Recognizer): {each!r:.80}")

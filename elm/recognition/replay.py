@@ -13,8 +13,8 @@ from elm.event import Event
 from elm.log import LoggedStore
 from elm.query import Query
 from elm.recognition.clocks import Timing
-from elm.recognition.enrolment import known_strands, refuse_changed
-from elm.recognition.fold import Fold, Taken
+from elm.recognition.enrolment import check_recognizers, known_strands, refuse_changed
+from elm.recognition.fold import Fold, Harvest
 from elm.recognition.judging import TypeJudge
 from elm.recognition.keeping import keep_results
 from elm.recognition.manager import BATCH
@@ -25,13 +25,17 @@ from elm.store import Arrival
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Replay:
-    """What a replay of the log found: complex events by uid, how many of them the memory did not have, and lag.
+    """What a replay of the log found.
 
-    `missing` are results of these recognizers that the memory has and the replay lacks: found live where late
-    events were not known, or by what came before the position it began at. `late` events were not fed.
+    `entries` is how many entries of the log it took in. `found` are the uids of all complex events that it found,
+    in the order of detection, and `new` those among them that the memory did not have before. `missing` are uids of
+    results of these recognizers that the memory has and the replay lacks: found live where late events were not
+    known, or by what came before the position it began at. `late` is how many times an event came too late to be
+    fed to a strand of recognizers.
 
     `forgotten` is the position of the first entry whose event has been forgotten, None where there is none: the
-    replay ends before it. What it found is that of the log up to there, and what it lacks cannot be told.
+    replay ends before it. What it found is that of the log up to there; what it lacks cannot be told, and `missing`
+    is empty.
     """
 
     entries: int
@@ -59,6 +63,7 @@ def replay(
 
     Where an event of the log was forgotten the replay ends: what follows from it cannot be known.
     """
+    check_recognizers(recognizers)
     timing = timing or Timing()
     judge = TypeJudge(store.types)
     strands = known_strands(store, recognizers, timing, judge)
@@ -90,17 +95,18 @@ def replay(
     )
 
 
-def _keep(store: LoggedStore, taken: Taken, found: list[UUID], new: list[UUID], *, commit: bool) -> None:
-    for _, failure in taken.failures:
+def _keep(store: LoggedStore, harvest: Harvest, found: list[UUID], new: list[UUID], *, commit: bool) -> None:
+    if harvest.failures:
+        _, failure = harvest.failures[0]
         raise InvalidValue(f"the replay ended, for a recognizer failed: {failure}") from failure.__cause__
-    wholes = [result.events[-1] for _, result in taken.results]
+    wholes = [result.events[-1] for _, result in harvest.results]
     found += [each.uid for each in wholes]
     if not commit:
         absent = [each.uid for each in wholes if not store.exists(UidCue(uids=(each.uid,)))]
         forgotten = {each.uid for each in store.tombstones(absent)}
         new += [uid for uid in absent if uid not in forgotten]
         return
-    events: list[Event] = [event for _, result in taken.results for event in result.events]
+    events: list[Event] = [event for _, result in harvest.results for event in result.events]
     kept = keep_results(store, [Arrival(event=event) for event in events], store.commit_all)
     fresh = {each.uid for each in kept if each.new}
     new += [each.uid for each in wholes if each.uid in fresh]

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
-from uuid import UUID
 
 import msgspec
 
 from elm.errors import InvalidValue
-from elm.event import Event, StoredEvent
+from elm.event import Event, StoredEvent, hashed_uid
+from elm.extents import common_agent, in_uid_order, span
 from elm.features import Feature, kind_of, value_text
 from elm.geometry import derived_region
 from elm.interval import Interval, from_micros, to_micros
@@ -63,7 +62,7 @@ def result_of(recognizer: Recognizer, definition: str, emission: Emission, *, mo
             interval=Interval.at(emission.deadline),
             agent=agent,
             features=marks,
-            uid=_uid([*told, DEADLINE_STEP]),
+            uid=hashed_uid(msgspec.json.encode([*told, DEADLINE_STEP])),
         )
         events.append(instant)
         parts.append(_instant(instant, moment))
@@ -71,7 +70,7 @@ def result_of(recognizer: Recognizer, definition: str, emission: Emission, *, mo
         type=emission.type,
         parts=[part.uid for part in parts],
         features=[*marks, *(each for each in emission.features if each not in marks)],
-        uid=_uid(told),
+        uid=hashed_uid(msgspec.json.encode(told)),
     )
     events.append(whole)
     stored = StoredEvent.of_row((whole, parts, moment), _DERIVED)
@@ -84,12 +83,6 @@ def depth_of(emission: Emission) -> int:
         return 1
     depths = [value for _, part in emission.parts for value in part.values(DEPTH) if isinstance(value, int)]
     return 1 + max(depths, default=0)
-
-
-def _uid(told: Sequence[Any]) -> UUID:
-    """A UUID of version 8 (RFC 9562): a hash of what is told."""
-    number = int.from_bytes(hashlib.sha256(msgspec.json.encode(told)).digest()[:16])
-    return UUID(int=number & ~(0xF << 76) & ~(0x3 << 62) | 8 << 76 | 2 << 62)
 
 
 def _instant(event: Event, moment: int) -> StoredEvent:
@@ -105,32 +98,17 @@ def _instant(event: Event, moment: int) -> StoredEvent:
     )
 
 
-def _span(row: Sequence[Any]) -> Interval:
-    intervals = [part.interval for part in row[1]]
-    ends = [each.end for each in intervals if each.end is not None]
-    return Interval(begin=min(each.begin for each in intervals), end=max(ends))
-
-
-def _agent(row: Sequence[Any]) -> str | None:
-    agents = {part.agent for part in row[1]}
-    return agents.pop() if len(agents) == 1 else None
-
-
-def _in_uid_order(row: Sequence[Any]) -> list[StoredEvent]:
-    return sorted(row[1], key=lambda part: part.uid)
-
-
 # As a store will derive it, each when it is first looked at: a hull is dear, and few recognizers ask for one.
 _DERIVED: Mapping[str, Callable[[Sequence[Any]], Any]] = MappingProxyType(
     {
         "id": lambda row: 0,
         "uid": lambda row: row[0].uid,
         "type": lambda row: row[0].type,
-        "interval": _span,
-        "region": lambda row: derived_region(part.region for part in _in_uid_order(row)),
-        "subject": lambda row: derived_region(part.subject for part in _in_uid_order(row)),
+        "interval": lambda row: span(part.interval for part in row[1]),
+        "region": lambda row: derived_region(part.region for part in in_uid_order(row[1])),
+        "subject": lambda row: derived_region(part.subject for part in in_uid_order(row[1])),
         "features": lambda row: row[0].features,
-        "agent": _agent,
+        "agent": lambda row: common_agent(row[1]),
         "payload": lambda row: None,
         "parts": lambda row: row[0].parts,
         "wholes": lambda row: (),

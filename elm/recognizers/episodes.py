@@ -15,7 +15,7 @@ from elm.interval import from_micros
 from elm.recognizers.base import DEADLINE, Emission, Fed, Judge, Process, check_feature
 from elm.recognizers.conditions import Same
 from elm.recognizers.durations import check_duration, later, micros_of
-from elm.recognizers.grouped import MOST_PARTS, Group, Grouped, GroupedProcess, alike
+from elm.recognizers.grouped import MOST_PARTS, Grouped, GroupedProcess, HeldGroup, alike
 from elm.recognizers.naming import sorted_names
 from elm.recognizers.partition import Key, values_of
 from elm.taxonomy import EventType
@@ -70,15 +70,15 @@ class _Sessions(GroupedProcess[Session]):
             self._split += 1
             found, group = self._over(group), None
         if group is None:
-            group = Group(key, (), deadline, [])
+            group = HeldGroup(key, (), deadline, [])
         group.add(fed, deadline)
         self._put(group)
         return found
 
-    def _tells(self, group: Group) -> bool:
+    def _tells(self, group: HeldGroup) -> bool:
         return len(group.held) >= self._definition.least
 
-    def _over(self, group: Group) -> Sequence[Emission]:
+    def _over(self, group: HeldGroup) -> Sequence[Emission]:
         if len(group.held) < self._definition.least:
             return ()
         parts = alike(group.held)
@@ -150,7 +150,7 @@ class _Missions(GroupedProcess[Mission]):
             return (self._emission(group, mission.type, "match", end=fed),)
         restarts = group is None or mission.again is Again.RESTART
         if restarts and self._around.matches(mission.begin, fed.event):
-            self._put(Group(key, (), later(fed.moment, micros_of(mission.within)), [fed]))
+            self._put(HeldGroup(key, (), later(fed.moment, micros_of(mission.within)), [fed]))
         elif group is not None and mission.include is not None and self._around.matches(mission.include, fed.event):
             if len(group.held) < mission.most_parts - 1:
                 group.held.append(fed)
@@ -158,20 +158,20 @@ class _Missions(GroupedProcess[Mission]):
                 self._dropped += 1
         return ()
 
-    def _ends(self, group: Group, fed: Fed) -> bool:
+    def _ends(self, group: HeldGroup, fed: Fed) -> bool:
         if not self._around.matches(self._definition.end, fed.event):
             return False
         begun = group.held[0].event
         return all(Same(feature=name, step=_BEGIN).between(fed.event, begun) for name in self._definition.same)
 
-    def _tells(self, group: Group) -> bool:
+    def _tells(self, group: HeldGroup) -> bool:
         return self._definition.timed_out is not None
 
-    def _over(self, group: Group) -> Sequence[Emission]:
+    def _over(self, group: HeldGroup) -> Sequence[Emission]:
         timed_out = self._definition.timed_out
         return () if timed_out is None else (self._emission(group, timed_out, "timed out"),)
 
-    def _emission(self, group: Group, type_name: str, output: str, *, end: Fed | None = None) -> Emission:
+    def _emission(self, group: HeldGroup, type_name: str, output: str, *, end: Fed | None = None) -> Emission:
         first, *rest = group.held
         parts = [(_BEGIN, first.event), *((_INCLUDE, fed.event) for fed in rest)]
         features = []
@@ -235,20 +235,20 @@ class _Repetitions(GroupedProcess[Repetition]):
         else:
             deadline = _last_of_day(fed.moment)
         if len(held) < self._definition.times:
-            self._put(Group(key, (), deadline, held))
+            self._put(HeldGroup(key, (), deadline, held))
             return ()
         if group is not None:
             self._remove(group)
         if per == DAY:
-            self._put(Group(key, (), deadline, []))
+            self._put(HeldGroup(key, (), deadline, []))
         parts = alike(held)
         features = self._definition.measured(parts)
         return (Emission(type=self._definition.type, parts=parts, key=values_of(key), features=features),)
 
-    def _tells(self, group: Group) -> bool:
+    def _tells(self, group: HeldGroup) -> bool:
         return False
 
-    def _over(self, group: Group) -> Sequence[Emission]:
+    def _over(self, group: HeldGroup) -> Sequence[Emission]:
         return ()
 
 

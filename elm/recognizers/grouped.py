@@ -106,7 +106,7 @@ class Grouped:
 
 
 @dataclass(slots=True)
-class Group:
+class HeldGroup:
     """Events that one key holds until a moment; `tag` tells apart what a process holds under one key."""
 
     key: Key
@@ -147,8 +147,8 @@ class GroupedProcess(ABC, Generic[Definition]):
         self._definition = definition
         self._around = around
         self._partition = tuple(definition.partition)
-        self._groups: dict[tuple[Key, tuple[str, ...]], Group] = {}
-        self._telling: dict[tuple[Key, tuple[str, ...]], Group] = {}
+        self._groups: dict[tuple[Key, tuple[str, ...]], HeldGroup] = {}
+        self._telling: dict[tuple[Key, tuple[str, ...]], HeldGroup] = {}
         """Those of the groups, in their order, of which something is told when their time is over."""
         self._dropped = 0
         self._split = 0
@@ -160,7 +160,7 @@ class GroupedProcess(ABC, Generic[Definition]):
         process._dropped, process._split = snapshot["dropped"], snapshot["split"]
         for told in snapshot["groups"]:
             key = tuple((kind, value) for kind, value in told["key"])
-            process._put(Group(key, tuple(told["tag"]), told["deadline"], [held[uid] for uid in told["held"]]))
+            process._put(HeldGroup(key, tuple(told["tag"]), told["deadline"], [held[uid] for uid in told["held"]]))
         return process
 
     def feed(self, fed: Fed) -> Sequence[Emission]:
@@ -222,17 +222,17 @@ class GroupedProcess(ABC, Generic[Definition]):
         """What an event does to the groups of a key."""
 
     @abstractmethod
-    def _tells(self, group: Group) -> bool:
+    def _tells(self, group: HeldGroup) -> bool:
         """Whether anything follows when the time of a group is over; else nobody need wait for that."""
 
     @abstractmethod
-    def _over(self, group: Group) -> Sequence[Emission]:
+    def _over(self, group: HeldGroup) -> Sequence[Emission]:
         """What follows when the time of a group, which is no longer held, is over."""
 
-    def _find(self, key: Key, *tag: str) -> Group | None:
+    def _find(self, key: Key, *tag: str) -> HeldGroup | None:
         return self._groups.get((key, tag))
 
-    def _put(self, group: Group) -> None:
+    def _put(self, group: HeldGroup) -> None:
         """Hold a group, behind all others; beyond the bound the one whose time is over first is dropped."""
         name = (group.key, group.tag)
         self._groups.pop(name, None)
@@ -244,7 +244,7 @@ class GroupedProcess(ABC, Generic[Definition]):
             self._remove(next(iter(self._groups.values())))
             self._dropped += 1
 
-    def _remove(self, group: Group) -> None:
+    def _remove(self, group: HeldGroup) -> None:
         name = (group.key, group.tag)
         del self._groups[name]
         self._telling.pop(name, None)

@@ -6,15 +6,13 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Self
 from uuid import UUID
 
-from elm.features import Feature, FeatureValue
-from elm.interval import from_micros
 from elm.recognizers.base import Emission, Fed, Judge
+from elm.recognizers.deadlines import Deadlines
+from elm.recognizers.decisions import counting, match_of, time_out_of
 from elm.recognizers.hits import Hits
-from elm.recognizers.partition import Key, keys_of, values_of
+from elm.recognizers.partition import Key, keys_of
 from elm.recognizers.plan import Plan, Rules, Target
 from elm.recognizers.runs import NOTHING, Queue, Run, Taken, run_of, told
-
-MATCH, TIMED_OUT = "match", "timed out"
 
 
 class Matching:
@@ -25,14 +23,11 @@ class Matching:
         self._plan = plan
         self._around = around
         self._runs: dict[Key, list[Run]] = {}
-        self._timers = Queue(lambda pushed, run: run.alive and run.timer == pushed)
-        self._silent = Queue(lambda pushed, run: run.alive and run.timer == pushed)
-        """Deadlines of runs that nothing comes of: nobody need wait for them."""
+        self._deadlines = Deadlines(rules, plan)
         self._oldest: Queue | None = None
         """Runs as they began, kept from the first time on that there were too many."""
         self._place = 0
         self._serial = 0
-        self._pushed = 0
         self._held = 0
         self._has_ended = False
         """Whether a run has ended since the event at hand came in."""
@@ -44,7 +39,7 @@ class Matching:
     def feed(self, fed: Fed) -> Sequence[Emission]:
         """Take in an event; those that matched because of it."""
         event = fed.event
-        if self._silent.may_begin_before(fed.moment):
+        if self._deadlines.silent.may_begin_before(fed.moment):
             self._end_silent(fed.moment)
         try:
             statics = self._by_type[event.type]
@@ -112,9 +107,6 @@ class Matching:
             if self._plan.watches[run.taken[1]]:
                 self._pass_over(run, targets, hits, certain)
 
-    def _targets(self, run: Run) -> tuple[Target, ...]:
-        return self._plan.targets(run.taken[1], run.count)
-
     def _is_possible(self, run: Run, target: Target, fed: Fed, hits: Hits) -> bool:
         if not hits.of(target.step) or (target.strict and run.passed):
             return False
@@ -148,21 +140,22 @@ class Matching:
 
     def _go_on(self, run: Run, certain: list[Run]) -> None:
         """What follows from an event just taken: a match, and until when the run waits."""
-        targets = self._targets(run)
-        if self._is_accepting(run) and self._plan.absent is None and (not targets or targets[0].divides):
+        plan, step = self._plan, run.taken[1]
+        targets = plan.targets(step, run.count)
+        if plan.absent is None and plan.accepts(step, run.count) and (not targets or targets[0].divides):
             # A copy stands for the match; the run itself goes on, if it can.
             certain.append(self._copy(run))
             if not targets:
                 self._end(run)
                 return
-        self._set_deadline(run, targets)
+        self._deadlines.set(run, targets, self._held)
 
     def _pass_over(self, run: Run, targets: tuple[Target, ...], hits: Hits, certain: list[Run]) -> None:
         run.passed = True
         plan, step = self._plan, run.taken[1]
         met = [g for g in plan.guards_behind[step] if g not in run.closed and hits.of(g) and hits.holds(g, run.taken)]
         absent = plan.absent
-        waits = absent is not None and absent not in run.closed and self._is_accepting(run)
+        waits = absent is not None and absent not in run.closed and plan.accepts(step, run.count)
         if waits and absent is not None and hits.of(absent) and hits.holds(absent, run.taken):
             met.append(absent)
             waits = False
@@ -172,47 +165,14 @@ class Matching:
             return
         if waits or any(not (each.strict or run.closed.intersection(each.guards)) for each in targets):
             if absent in run.closed:
-                self._set_deadline(run, targets)
+                self._deadlines.set(run, targets, self._held)
             return
-        if absent is None and self._is_match_at_its_end(run, targets):
+        # An accepting run has waited to take more: if its first target divides it was a match at once.
+        if absent is None and plan.accepts(step, run.count) and not targets[0].divides:
             certain.append(self._copy(run))
         self._end(run)
 
-    # What follows
-
-    def _is_accepting(self, run: Run) -> bool:
-        step = run.taken[1]
-        return run.count >= self._plan.least[step] and self._plan.may_end[step]
-
-    def _is_match_at_its_end(self, run: Run, targets: tuple[Target, ...]) -> bool:
-        """Whether an accepting run waited to take more; if its first target divides it was a match at once."""
-        return self._is_accepting(run) and not targets[0].divides
-
-    def _set_deadline(self, run: Run, targets: tuple[Target, ...]) -> None:
-        absent = self._plan.absent
-        if absent is not None and absent not in run.closed and self._is_accepting(run):
-            deadline = run.last + self._plan.absent_for
-        else:
-            deadline = run.begin + self._rules.within
-            gaps = [each.gap for each in targets if each.gap is not None]
-            if gaps and len(gaps) == len(targets):
-                deadline = min(deadline, run.last + max(gaps))
-        ends_silently = not self._tells_at_its_end(run, targets)
-        if deadline != run.deadline or ends_silently is not run.ends_silently:
-            run.deadline, run.ends_silently = deadline, ends_silently
-            self._pushed += 1
-            run.timer = self._pushed
-            queue = self._silent if ends_silently else self._timers
-            queue.push(deadline, self._pushed, run)
-            queue.tidy(self._held)
-
-    def _tells_at_its_end(self, run: Run, targets: tuple[Target, ...]) -> bool:
-        """Whether something is emitted when time has passed beyond a run's deadline."""
-        if not self._is_accepting(run):
-            return self._rules.timed_out is not None
-        if self._plan.absent is not None:
-            return self._plan.absent not in run.closed
-        return not targets[0].divides
+    # What becomes of runs
 
     def _copy(self, run: Run) -> Run:
         copy = Run(run.serial, run.key, run.start, run.taken, run.count, run.begin, run.last)
@@ -249,63 +209,26 @@ class Matching:
         for key in keys:
             self._clear(key)
 
-    # Which matches count
-
-    def _decided(self, certain: list[Run], moment: int) -> list[Emission]:
-        """The results among matches that are certain at one moment, of one partition or of several."""
-        found: list[Emission] = []
-        barred_to: dict[Key, int] = {}
-        barred: set[tuple[Key, int]] = set()
-        for run in sorted(certain, key=Run.rank):
-            if run.start <= barred_to.get(run.key, 0) or (run.key, run.start) in barred:
-                continue
-            found.append(self._emission(run, MATCH, self._rules.type, moment))
-            if self._rules.bars_overlaps:
-                barred_to[run.key] = run.taken[3]
-                self._bar(run.key, 0, run.taken[3])
-            elif self._rules.bars_same_start:
-                barred.add((run.key, run.start))
-                self._bar(run.key, run.start, run.start)
-        return found
-
     def _bar(self, key: Key, first: int, last: int) -> None:
         """End the runs of a partition that began from one place to another."""
         for other in self._runs.get(key, ()):
             if first <= other.start <= last:
                 self._end(other)
 
-    def _emission(self, run: Run, output: str, kind: str, moment: int) -> Emission:
-        trail = run.trail()
-        waited = output == TIMED_OUT or self._plan.absent is not None
-        return Emission(
-            type=kind,
-            parts=tuple((self._plan.names[step], fed.event) for _, step, fed, _ in trail),
-            output=output,
-            key=values_of(run.key),
-            features=self._measured(trail),
-            deadline=from_micros(moment) if waited else None,
-        )
-
-    def _measured(self, trail: Sequence[Taken]) -> tuple[Feature, ...]:
-        found: list[tuple[str, FeatureValue]] = []
-        for name, measure in self._rules.measures.items():
-            of_step = [fed.event for _, at, fed, _ in trail if measure.step in (None, self._plan.names[at])]
-            value = measure.of(of_step)
-            if value is not None:
-                found.append((name, value))
-        return tuple(found)
+    def _decided(self, certain: list[Run], moment: int) -> list[Emission]:
+        """The results among matches that are certain at one moment, of one partition or of several."""
+        return [match_of(run, self._rules, self._plan, moment) for run in counting(certain, self._rules, self._bar)]
 
     # What time brings
 
     def deadline(self) -> int | None:
         """The moment after which `expire` has something to tell."""
-        return self._timers.first()
+        return self._deadlines.first()
 
     def _end_silent(self, moment: int) -> None:
         """Let go of runs whose time was over before a moment, and that nothing comes of."""
         keys: set[Key] = set()
-        while (deadline := self._silent.first()) is not None and deadline < moment:
-            run = self._silent.pop()
+        for run in self._deadlines.silent_before(moment):
             self._end(run)
             keys.add(run.key)
         for key in keys:
@@ -315,18 +238,14 @@ class Matching:
         """Time has passed beyond `moment`: what matched or timed out because of it, by deadline."""
         found: list[Emission] = []
         while (deadline := self.deadline()) is not None and deadline <= moment:
-            due: list[Run] = []
-            while self.deadline() == deadline:
-                due.append(self._timers.pop())
-                due[-1].deadline, due[-1].timer = None, 0
-            found += self._expired(due, deadline)
+            found += self._expired(self._deadlines.due(deadline), deadline)
         self._end_silent(moment + 1)
         return found
 
     def _expired(self, due: list[Run], deadline: int) -> list[Emission]:
         certain, late = [], []
         for run in due:
-            if self._is_accepting(run):
+            if self._plan.accepts(run.taken[1], run.count):
                 certain.append(self._copy(run))
                 self._end(run)
             else:
@@ -334,8 +253,9 @@ class Matching:
         found = self._decided(certain, deadline) if certain else []
         for run in sorted(late, key=Run.rank):
             # Only with a type for what timed out is a run that did not match waited for.
-            if run.alive and self._rules.timed_out is not None:
-                found.append(self._emission(run, TIMED_OUT, self._rules.timed_out, deadline))
+            kind = self._rules.timed_out
+            if run.alive and kind is not None:
+                found.append(time_out_of(run, self._rules, self._plan, type_name=kind, deadline=deadline))
                 self._end(run)
         for key in {run.key for run in due}:
             self._clear(key)
@@ -374,5 +294,5 @@ class Matching:
         for each in snapshot["runs"]:
             run = run_of(each, held)
             process._hold(run)
-            process._set_deadline(run, process._targets(run))
+            process._deadlines.set(run, plan.targets(run.taken[1], run.count), process._held)
         return process

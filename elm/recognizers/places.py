@@ -14,7 +14,7 @@ from elm.event import StoredEvent
 from elm.geometry import LIMIT, Region, SpatialRelation
 from elm.recognizers.base import Emission, Fed, Judge, Process
 from elm.recognizers.durations import later, micros_of
-from elm.recognizers.grouped import MOST_PARTS, Group, Grouped, GroupedProcess, alike
+from elm.recognizers.grouped import MOST_PARTS, Grouped, GroupedProcess, HeldGroup, alike
 from elm.recognizers.partition import Key, values_of
 from elm.taxonomy import EventType
 from elm.text import check_short_name
@@ -125,7 +125,7 @@ class _Stays(GroupedProcess[Stay]):
             found += self._over(group)
             group = None
         if group is None:
-            group = Group(key, (_INSIDE, place), deadline, [])
+            group = HeldGroup(key, (_INSIDE, place), deadline, [])
         group.add(fed, deadline)
         self._put(group)
         return found
@@ -138,13 +138,13 @@ class _Stays(GroupedProcess[Stay]):
             found += self._over(group)
             found += self._crossing(self._definition.leave, "leave", group, fed)
         if self._definition.enter is not None:
-            self._put(Group(key, (_OUTSIDE, place), later(fed.moment, self._gap), [fed]))
+            self._put(HeldGroup(key, (_OUTSIDE, place), later(fed.moment, self._gap), [fed]))
         return found
 
-    def _tells(self, group: Group) -> bool:
+    def _tells(self, group: HeldGroup) -> bool:
         return group.tag[0] == _INSIDE and (group.span >= self._least or self._definition.passage is not None)
 
-    def _over(self, group: Group) -> Sequence[Emission]:
+    def _over(self, group: HeldGroup) -> Sequence[Emission]:
         side, place = group.tag
         if side == _OUTSIDE:
             return ()
@@ -162,7 +162,7 @@ class _Stays(GroupedProcess[Stay]):
         )
         return (emission,)
 
-    def _crossing(self, kind: str | None, output: str, before: Group, fed: Fed) -> Sequence[Emission]:
+    def _crossing(self, kind: str | None, output: str, before: HeldGroup, fed: Fed) -> Sequence[Emission]:
         """The last event on one side and the first on the other."""
         if kind is None:
             return ()
@@ -172,7 +172,7 @@ class _Stays(GroupedProcess[Stay]):
         return (Emission(type=kind, parts=parts, output=output, key=key, features=((PLACE, place),)),)
 
 
-def _other_side(group: Group) -> str:
+def _other_side(group: HeldGroup) -> str:
     return _INSIDE if group.tag[0] == _OUTSIDE else _OUTSIDE
 
 
@@ -228,13 +228,13 @@ class _Standstills(GroupedProcess[Standstill]):
             if not self._reaches(group.held[0], fed):
                 found = self._over(group)
                 held = [] if found else self._from_later(group.held, fed)
-                group = Group(key, group.tag, deadline, held)
+                group = HeldGroup(key, group.tag, deadline, held)
             elif len(group.held) >= self._definition.most_parts:
                 self._split += 1
                 found = self._over(group)
                 group = None
         if group is None:
-            group = Group(key, (where.frame,), deadline, [])
+            group = HeldGroup(key, (where.frame,), deadline, [])
         group.add(fed, deadline)
         self._put(group)
         return found
@@ -254,10 +254,10 @@ class _Standstills(GroupedProcess[Standstill]):
             return False
         return bool(there.polygon.distance(here.polygon.centroid) <= self._definition.radius)
 
-    def _tells(self, group: Group) -> bool:
+    def _tells(self, group: HeldGroup) -> bool:
         return group.span >= micros_of(self._definition.least)
 
-    def _over(self, group: Group) -> Sequence[Emission]:
+    def _over(self, group: HeldGroup) -> Sequence[Emission]:
         if not self._tells(group):
             return ()
         parts = alike(group.held)

@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from elm.cues.algebra import Cue
 from elm.recognizers.conditions import Condition
 from elm.recognizers.durations import micros_of
-from elm.recognizers.elements import Absent, Contiguity, Step, Without
+from elm.recognizers.elements import Absent, Contiguity, Element, Step, Without
 from elm.recognizers.measures import Measure
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from elm.recognizers.elements import Element
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,6 +58,10 @@ class Plan:
         if count < self.least[step]:
             return self.again_or_ahead[step][:1]
         return self.again_or_ahead[step] if count < self.most[step] else self.ahead[step]
+
+    def accepts(self, step: int, count: int) -> bool:
+        """Whether a run may end whose last event was taken by `step`, which has taken `count`."""
+        return count >= self.least[step] and self.may_end[step]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

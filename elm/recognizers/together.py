@@ -13,7 +13,7 @@ from elm.cues.relations import Place, named
 from elm.recognizers.base import Emission, Fed, Judge, Process
 from elm.recognizers.conditions import Condition, Near, Same
 from elm.recognizers.durations import later, micros_of
-from elm.recognizers.grouped import Group, Grouped, GroupedProcess
+from elm.recognizers.grouped import Grouped, GroupedProcess, HeldGroup
 from elm.recognizers.naming import sorted_names
 from elm.recognizers.partition import Key, values_of
 
@@ -122,10 +122,10 @@ class _CoOccurrences(GroupedProcess[CoOccurrence]):
             del held[0]
             self._dropped += 1
         held.append(fed)
-        self._put(Group(key, (side,), later(fed.moment, self._within), held))
+        self._put(HeldGroup(key, (side,), later(fed.moment, self._within), held))
 
-    def _tells(self, group: Group) -> bool:
+    def _tells(self, group: HeldGroup) -> bool:
         return False
 
-    def _over(self, group: Group) -> Sequence[Emission]:
+    def _over(self, group: HeldGroup) -> Sequence[Emission]:
         return ()

@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING
 
+from elm.errors import InvalidValue
+
 if TYPE_CHECKING:
     from elm.log import LoggedStore
 
@@ -14,6 +16,9 @@ IN_PROCESS = "memory://"
 
 def resolve_dsn(dsn: str | None) -> str:
     """The DSN given, else ELM_DSN, else that of the private cluster, which is started for it."""
+    if dsn == "":
+        # As "$DATABASE" is in a shell that does not know it: another memory than was meant must not be written.
+        raise InvalidValue("an empty DSN names no database: leave it out for ELM_DSN or elm's private cluster")
     if chosen := dsn or os.environ.get("ELM_DSN"):
         return chosen
     from elm.storage.cluster import Cluster

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from uuid import UUID
 
-from elm.event import Event, content_hash
+from elm.event import Event
 from elm.storage.encoding import Row
 from elm.storage.event_writing import encoder
 from elm.storage.names import NameCache
@@ -16,34 +16,53 @@ from elm.store import Arrival
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Batch:
-    """What is refused already, the rows that repeat an earlier one, the rest by their index, and what encodes it."""
+    """What is refused already, the rows whose uid stands earlier, the rest by their index, and what encodes them."""
 
     arrivals: Sequence[Arrival]
     now: datetime
-    heights: Sequence[int]
-    refused: dict[int, str]
-    repeats: set[int]
+    unknown: Mapping[int, str]
+    """Rows that are refused for their type, with the reason: they say nothing of later rows of their uid."""
+    doubles: Mapping[int, int]
+    """For each row whose uid stands earlier, the first row that has it."""
     rest: Sequence[int]
+    heights: Mapping[int, int]
+    """Of the rest."""
     encode: Callable[[Arrival], Row]
+
+    def cut(self, start: int, stop: int) -> Batch:
+        """The rows from `start` to before `stop`, as a batch of their own."""
+        unknown = {index - start: reason for index, reason in self.unknown.items() if start <= index < stop}
+        return _sorted(self.arrivals[start:stop], self.now, unknown, self.encode)
 
 
 def made_ready(arrivals: Sequence[Arrival], names: NameCache) -> Batch:
     """What can be done for a batch without waiting for the database, but for names it has not seen yet."""
     now = datetime.now(UTC)
-    refused, repeats = repeated(arrivals)
     types = names.known_type_ids([arrival.event.type for arrival in arrivals])
-    for index, arrival in enumerate(arrivals):
-        if arrival.event.type not in types:
-            refused[index] = f"unknown event type {arrival.event.type!r}: add it first (`elm types add`)"
-    rest = [index for index in range(len(arrivals)) if index not in refused and index not in repeats]
+    unknown = {
+        index: f"unknown event type {arrival.event.type!r}: add it first (`elm types add`)"
+        for index, arrival in enumerate(arrivals)
+        if arrival.event.type not in types
+    }
+    events = [arrival.event for index, arrival in enumerate(arrivals) if index not in unknown]
+    return _sorted(arrivals, now, unknown, encoder(events, names, now))
+
+
+def _sorted(
+    arrivals: Sequence[Arrival], now: datetime, unknown: Mapping[int, str], encode: Callable[[Arrival], Row]
+) -> Batch:
+    known = [index for index in range(len(arrivals)) if index not in unknown]
+    doubles = repeated(arrivals, known)
+    rest = [index for index in known if index not in doubles] if doubles else known
+    heights = levels([arrivals[index].event for index in rest])
     return Batch(
         arrivals=arrivals,
         now=now,
-        heights=levels([arrival.event for arrival in arrivals]),
-        refused=refused,
-        repeats=repeats,
+        unknown=unknown,
+        doubles=doubles,
         rest=rest,
-        encode=encoder([arrivals[index].event for index in rest], names, now),
+        heights=dict(zip(rest, heights, strict=True)),
+        encode=encode,
     )
 
 
@@ -58,28 +77,23 @@ def levels(events: Sequence[Event]) -> list[int]:
     return found
 
 
-def repeated(arrivals: Sequence[Arrival]) -> tuple[dict[int, str], set[int]]:
-    """The rows of a batch whose uid stands earlier in it: those with other content, with a reason, and the rest."""
-    first: dict[UUID, Event] = {}
-    other: dict[int, str] = {}
-    same: set[int] = set()
-    for index, arrival in enumerate(arrivals):
-        known = first.get(arrival.event.uid)
-        if known is None:
-            first[arrival.event.uid] = arrival.event
-        elif known is arrival.event or content_hash(known) == content_hash(arrival.event):
-            same.add(index)
-        else:
-            other[index] = f"the uid {known.uid} stands earlier with other content: give one of them a new uid"
-    return other, same
+def repeated(arrivals: Sequence[Arrival], rows: Iterable[int]) -> dict[int, int]:
+    """Those of some rows whose uid stands earlier among them, each with the first row that has it."""
+    first: dict[UUID, int] = {}
+    found: dict[int, int] = {}
+    for index in rows:
+        earlier = first.setdefault(arrivals[index].event.uid, index)
+        if earlier != index:
+            found[index] = earlier
+    return found
 
 
-def parts_to_come(arrivals: Sequence[Arrival]) -> dict[int, set[UUID]]:
-    """For each row the parts that stand only later in the batch."""
-    place = {arrival.event.uid: index for index, arrival in reversed(list(enumerate(arrivals)))}
+def parts_to_come(batch: Batch) -> dict[int, set[UUID]]:
+    """For each row of the rest the parts that stand only later in it."""
+    place = {batch.arrivals[index].event.uid: index for index in batch.rest}
     found = {
-        index: {part for part in arrival.event.parts if place.get(part, -1) > index}
-        for index, arrival in enumerate(arrivals)
-        if arrival.event.parts
+        index: {part for part in batch.arrivals[index].event.parts if place.get(part, -1) > index}
+        for index in batch.rest
+        if batch.arrivals[index].event.parts
     }
     return {index: parts for index, parts in found.items() if parts}

@@ -107,6 +107,7 @@ class Cluster:
                     self._server.stop()
 
     def status(self) -> ClusterStatus:
+        """What is there now, whether the server runs or not; nothing is started or made."""
         with self._explained():
             account = self._account()
             pid = self._server.pid

@@ -11,7 +11,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import wraps
-from threading import Lock
+from threading import RLock
 from typing import Any, ParamSpec, TypeVar
 from weakref import WeakSet
 
@@ -19,14 +19,9 @@ import psycopg
 from psycopg import sql
 from psycopg.types.string import ByteaBinaryLoader
 
-from elm.errors import (
-    DatabaseUnfit,
-    DatabaseUnreachable,
-    ElmError,
-    MemoryMissing,
-    StoreClosed,
-    StoreFailure,
-)
+from elm.errors import DatabaseUnfit, DatabaseUnreachable, ElmError, MemoryMissing, StoreClosed, StoreFailure
+from elm.storage import forking
+from elm.storage.unreachable import unreachable
 
 Connection = psycopg.Connection[Any]
 _P = ParamSpec("_P")
@@ -46,7 +41,12 @@ _SESSION = {
 # The write statements are always the same plan; finding it anew would cost more than running it.
 WRITING = {"plan_cache_mode": "force_generic_plan"}
 # A recall's best plan depends on the cue's values, and starting parallel workers costs more than they save.
-RECALLING = {"plan_cache_mode": "force_custom_plan", "max_parallel_workers_per_gather": "0"}
+# What is read by a cursor is read to its end.
+RECALLING = {
+    "plan_cache_mode": "force_custom_plan",
+    "max_parallel_workers_per_gather": "0",
+    "cursor_tuple_fraction": "1",
+}
 # But for events asked for one by one there is one good plan, and to make it anew costs more than to run it.
 NAMING = {**RECALLING, "plan_cache_mode": "force_generic_plan"}
 
@@ -133,13 +133,21 @@ def open_connection(dsn: str, settings: dict[str, str], *, memory: str | None = 
             f"this is not a PostgreSQL DSN: {said}. Write it like postgresql://user@host:5432/database"
         ) from error
     except psycopg.OperationalError as error:
-        raise _unreachable(dsn, error) from error
+        raise unreachable(dsn, error) from error
+    forking.lost_by_children(connection)
+    try:
+        _set_up(connection, settings, memory)
+    except BaseException:
+        connection.close()
+        raise
+    return connection
+
+
+def _set_up(connection: Connection, settings: dict[str, str], memory: str | None) -> None:
     if connection.info.server_version < MINIMUM_SERVER * 10_000:
         version = connection.info.parameter_status("server_version")
-        connection.close()
         raise DatabaseUnfit(f"PostgreSQL {version} is too old: elm needs {MINIMUM_SERVER} or newer")
     if (encoding := connection.info.parameter_status("server_encoding")) != "UTF8":
-        connection.close()
         raise DatabaseUnfit(
             f"the database has the encoding {encoding}, which cannot hold every text: "
             f"elm needs one made by CREATE DATABASE ... ENCODING 'UTF8' TEMPLATE template0"
@@ -162,7 +170,6 @@ def open_connection(dsn: str, settings: dict[str, str], *, memory: str | None = 
         connection.adapters.register_loader(row[1], ByteaBinaryLoader)
     for oid in _RAW_OIDS:
         connection.adapters.register_loader(oid, ByteaBinaryLoader)
-    return connection
 
 
 _PASSWORD = re.compile(r"://[^/@]*:.*@|\bpassword", re.DOTALL)
@@ -180,32 +187,35 @@ def check_password(dsn: str) -> None:
         )
 
 
-def _unreachable(dsn: str, error: psycopg.OperationalError) -> ElmError:
-    # libpq's further lines only ask whether the server is running.
-    said = (str(error).strip() or "no answer").splitlines()[0]
-    shown = psycopg.conninfo.conninfo_to_dict(dsn)
-    where = f"{shown.get('host') or 'the local socket'}, database {shown.get('dbname') or 'of the default name'!r}"
-    return DatabaseUnreachable(
-        f"no database at {where}: {said}. Start the server, or correct the DSN "
-        f"(--dsn or ELM_DSN; without one elm runs a private server: `elm up`)"
-    )
-
-
 class Connections:
-    """The connections of one store: one to write with, and as many to recall with as results are being read."""
+    """The connections of one store: one to write with, and as many to recall with as results are being read.
+
+    A forked process opens its own; a result that was being read goes on in the process that asked for it.
+    """
 
     def __init__(self, dsn: str, memory: str) -> None:
         self._dsn = dsn
         self._memory = memory
         self._closed = False
-        self._lock = Lock()
+        # Both are reentrant: the garbage collector lets go of results that nobody reads on, and a signal's handler
+        # closes, amid whatever this thread was doing.
+        self._lock = RLock()
         self._idle: deque[Connection] = deque()
         self._idle_named: deque[Connection] = deque()
         self._writing: Connection | None = None
-        self._write_lock = Lock()
+        self._write_lock = RLock()
         self._opened: WeakSet[Connection] = WeakSet()
         # A memory that nobody closed lets go of the server too, without the driver's warning.
         weakref.finalize(self, _close_all, self._opened)
+        forking.renewed_in_children(self)
+
+    def begin_anew(self) -> None:
+        """Have no connection yet, and locks that nobody holds: those of another process were not meant for this."""
+        self._lock, self._write_lock = RLock(), RLock()
+        self._idle.clear()
+        self._idle_named.clear()
+        self._writing = None
+        self._opened.clear()
 
     def _open(self, settings: dict[str, str]) -> Connection:
         connection = open_connection(self._dsn, settings, memory=self._memory)
@@ -231,9 +241,9 @@ class Connections:
 
         One for `named` events plans a prepared statement once, whatever its values.
         """
-        self.check_open()
         idle = self._idle_named if named else self._idle
         with self._lock:
+            self.check_open()
             connection = idle.pop() if idle else None
         if connection is None or _is_lost(connection):
             connection = self._open(NAMING if named else RECALLING)
@@ -242,11 +252,12 @@ class Connections:
                 yield connection
         finally:
             reusable = connection.info.transaction_status == psycopg.pq.TransactionStatus.IDLE
-            if self._closed or not reusable:
-                connection.close()
-            else:
-                with self._lock:
+            with self._lock:
+                is_kept = reusable and not self._closed
+                if is_kept:
                     idle.append(connection)
+            if not is_kept:
+                connection.close()
 
     def check_open(self) -> None:
         """Refuse to go on after `close`."""
@@ -254,14 +265,18 @@ class Connections:
             raise StoreClosed(f"memory {self._memory!r} was closed: open it again with elm.connect")
 
     def close(self) -> None:
-        """Close all connections; one that a result is still being read from closes when that ends."""
-        self._closed = True
+        """Close all connections; one that a result is still being read from closes when that ends.
+
+        What is being written by then is written: closing waits for it.
+        """
         with self._lock:
+            self._closed = True
             for idle in (self._idle, self._idle_named):
                 while idle:
                     idle.pop().close()
-        if self._writing is not None:
-            self._writing.close()
+        with self._write_lock:
+            if self._writing is not None:
+                self._writing.close()
 
 
 def _is_lost(connection: Connection) -> bool:

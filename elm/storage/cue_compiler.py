@@ -42,26 +42,26 @@ from elm.cues.algebra import (
 )
 from elm.cues.relations import TypeRelation
 from elm.storage.conditions.kin import kin
-from elm.storage.conditions.rule import UIDS, Bind, Condition, Names, Rule, indexed
+from elm.storage.conditions.rule import UIDS, Bind, Names, Rule, SqlCondition, indexed
 from elm.storage.conditions.what import feature, feature_names, features
 from elm.storage.conditions.when import duration, time
 from elm.storage.conditions.where import region
 from elm.storage.tables import type_closure
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class CompiledCue:
     """A cue's shape (equal shapes have equal SQL), its values in order, and its condition on demand."""
 
     key: tuple[Any, ...]
     values: dict[str, Any]
-    condition: Callable[[FromClause], Condition]
-    search: Callable[[FromClause], Condition] | None
+    condition: Callable[[FromClause], SqlCondition]
+    search: Callable[[FromClause], SqlCondition] | None
     """What an index finds: all that match and, unless `is_search`, others; None where no index serves."""
     is_search: bool
-    glimpse: Callable[[FromClause], Condition] | None
+    glimpse: Callable[[FromClause], SqlCondition] | None
     """Something cheap that all fulfil that match, to be asked first of rows that no index chose."""
-    narrow: Callable[[FromClause], Condition] | None
+    narrow: Callable[[FromClause], SqlCondition] | None
     """What all fulfil that match, as an index understands it that knows begins too; None without one."""
 
 
@@ -70,13 +70,13 @@ def compile_cue(cue: Cue, names: Names, *, prefix: str = "p") -> CompiledCue:
     rule = _rule(cue, names)
     values = {f"{prefix}{index}": value for index, (value, _) in enumerate(rule.values)}
 
-    def bound(build: Callable[..., Condition]) -> Callable[[FromClause], Condition]:
-        def condition(e: FromClause) -> Condition:
+    def bound(build: Callable[..., SqlCondition]) -> Callable[[FromClause], SqlCondition]:
+        def condition(e: FromClause) -> SqlCondition:
             return build(e, *(bindparam(f"{prefix}{index}", type_=kind) for index, (_, kind) in enumerate(rule.values)))
 
         return condition
 
-    def bound_if_any(build: Callable[..., Condition] | None) -> Callable[[FromClause], Condition] | None:
+    def bound_if_any(build: Callable[..., SqlCondition] | None) -> Callable[[FromClause], SqlCondition] | None:
         return None if build is None else bound(build)
 
     return CompiledCue(
@@ -99,7 +99,11 @@ def _rule(cue: Cue, names: Names) -> Rule:
         case Not(arg=arg):
             inner = _rule(arg, names)
             # Two-valued logic: what is NULL for a missing component is not true, so its negation is.
-            return Rule(("not", inner.key), inner.values, lambda e, *p: inner.build(e, *p).is_not(true()))
+            return Rule(
+                key=("not", inner.key),
+                values=inner.values,
+                build=lambda e, *p: inner.build(e, *p).is_not(true()),
+            )
         case TypeCue() as condition:
             return _type(condition, names)
         case TimeCue() as condition:
@@ -135,20 +139,22 @@ def _combined(op: str, args: Sequence[Cue], names: Names) -> Rule:
     rules = [_rule(arg, names) for arg in args]
     values = tuple(value for rule in rules for value in rule.values)
 
-    def joined(e: FromClause, binds: Sequence[Bind], builds: Sequence[Callable[..., Condition] | None]) -> Condition:
+    def joined(
+        e: FromClause, binds: Sequence[Bind], builds: Sequence[Callable[..., SqlCondition] | None]
+    ) -> SqlCondition:
         rest = iter(binds)
         taken = [_take(rest, len(rule.values)) for rule in rules]
         built = [build(e, *own) for build, own in zip(builds, taken, strict=True) if build is not None]
         return and_(true(), *built) if op == "and" else or_(false(), *built)
 
-    def combined(parts: Sequence[Callable[..., Condition] | None]) -> Callable[..., Condition] | None:
+    def combined(parts: Sequence[Callable[..., SqlCondition] | None]) -> Callable[..., SqlCondition] | None:
         """What is made of those that have this: of some of those that hold together, or of all alternatives."""
         has = [part is not None for part in parts]
         if not (any(has) if op == "and" else has and all(has)):
             return None
         return lambda e, *binds: joined(e, binds, parts)
 
-    def build(e: FromClause, *binds: Bind) -> Condition:
+    def build(e: FromClause, *binds: Bind) -> SqlCondition:
         return joined(e, binds, [rule.build for rule in rules])
 
     return Rule(
@@ -170,21 +176,21 @@ def _type(cue: TypeCue, names: Names) -> Rule:
     match cue.relation:
         case TypeRelation.EXACTLY:
 
-            def exactly(e: FromClause, p: Bind) -> Condition:
+            def exactly(e: FromClause, p: Bind) -> SqlCondition:
                 return e.c.type_id == p
 
-            return Rule(("type", "exactly"), values, exactly, exactly, narrow=exactly)
+            return Rule(key=("type", "exactly"), values=values, build=exactly, search=exactly, narrow=exactly)
         case TypeRelation.IS_A:
 
-            def is_a(e: FromClause, p: Bind) -> Condition:
+            def is_a(e: FromClause, p: Bind) -> SqlCondition:
                 # IN (SELECT ...), not = ANY(ARRAY(SELECT ...)): the latter took 170 ms where this takes 2.
                 return e.c.type_id.in_(_below(p))
 
-            def narrow(e: FromClause, p: Bind) -> Condition:
+            def narrow(e: FromClause, p: Bind) -> SqlCondition:
                 # But between two begins this is one probe for each type, where that is a join with all in between.
                 return e.c.type_id == any_(func.array(_below(p).scalar_subquery()))
 
-            return Rule(("type", "is_a"), values, is_a, is_a, narrow=narrow)
+            return Rule(key=("type", "is_a"), values=values, build=is_a, search=is_a, narrow=narrow)
         case unknown:
             assert_never(unknown)
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Callable, Mapping, Sequence
-from datetime import UTC, datetime, timedelta
+from datetime import datetime
 from uuid import UUID
 
 import msgspec
@@ -13,6 +12,22 @@ from elm.event import Event, content_hash
 from elm.features import Feature, ends, fold, name_tokens
 from elm.geometry import Region
 from elm.interval import Interval
+from elm.storage.binary import (
+    ARRAY_HEADER,
+    BOTH_INCLUSIVE,
+    BOUNDED_RANGE,
+    EMPTY_ARRAY,
+    EPOCH,
+    INT2,
+    INT4,
+    INT8,
+    LOWER_INCLUSIVE_UPPER_INFINITE,
+    MICROSECOND,
+    OPEN_RANGE,
+    TEXT_TYPE,
+    UUID_ELEMENT,
+    UUID_TYPE,
+)
 
 COLUMNS = (
     "uid",
@@ -37,49 +52,41 @@ COLUMNS = (
 
 Row = tuple[bytes | None, ...]
 
-_PG_EPOCH = datetime(2000, 1, 1, tzinfo=UTC)
-_MICROSECOND = timedelta(microseconds=1)
-_UUID_OID, _TEXT_OID = 2950, 25
-
-int2: Callable[[int], bytes] = struct.Struct("!h").pack
+int2: Callable[[int], bytes] = INT2.pack
 """An integer of 16 bits."""
-int4: Callable[[int], bytes] = struct.Struct("!i").pack
+int4: Callable[[int], bytes] = INT4.pack
 """An integer of 32 bits."""
-int8: Callable[[int], bytes] = struct.Struct("!q").pack
+int8: Callable[[int], bytes] = INT8.pack
 """An integer of 64 bits."""
-_bounded = struct.Struct("!Biqiq").pack
-_open = struct.Struct("!Biq").pack
-_BOTH_INCLUSIVE, _LOWER_INCLUSIVE_UPPER_INFINITE = 0x06, 0x12
-_array = struct.Struct("!iiiii").pack
-_no_array = struct.Struct("!iii").pack
-_uuid_item = struct.Struct("!i16s").pack
+_bounded, _open = BOUNDED_RANGE.pack, OPEN_RANGE.pack
+_array, _no_array, _uuid_element = ARRAY_HEADER.pack, EMPTY_ARRAY.pack, UUID_ELEMENT.pack
 
 
 def timestamp(moment: datetime) -> bytes:
     """A UTC datetime as timestamptz."""
-    return int8((moment - _PG_EPOCH) // _MICROSECOND)
+    return int8((moment - EPOCH) // MICROSECOND)
 
 
 def period(interval: Interval) -> bytes:
     """An interval as tstzrange: both ends inclusive, or no upper end."""
-    begin = (interval.begin - _PG_EPOCH) // _MICROSECOND
+    begin = (interval.begin - EPOCH) // MICROSECOND
     if interval.end is None:
-        return _open(_LOWER_INCLUSIVE_UPPER_INFINITE, 8, begin)
-    return _bounded(_BOTH_INCLUSIVE, 8, begin, 8, (interval.end - _PG_EPOCH) // _MICROSECOND)
+        return _open(LOWER_INCLUSIVE_UPPER_INFINITE, 8, begin)
+    return _bounded(BOTH_INCLUSIVE, 8, begin, 8, (interval.end - EPOCH) // MICROSECOND)
 
 
 def uuids(uids: Sequence[UUID]) -> bytes:
     """Several uids as uuid[]."""
     if not uids:
-        return _no_array(0, 0, _UUID_OID)
-    return _array(1, 0, _UUID_OID, len(uids), 1) + b"".join([_uuid_item(16, uid.bytes) for uid in uids])
+        return _no_array(0, 0, UUID_TYPE)
+    return _array(1, 0, UUID_TYPE, len(uids), 1) + b"".join([_uuid_element(16, uid.bytes) for uid in uids])
 
 
 def texts(values: Sequence[str]) -> bytes:
     """Several texts as text[]."""
     if not values:
-        return _no_array(0, 0, _TEXT_OID)
-    items = [_array(1, 0, _TEXT_OID, len(values), 1)]
+        return _no_array(0, 0, TEXT_TYPE)
+    items = [_array(1, 0, TEXT_TYPE, len(values), 1)]
     for value in values:
         data = value.encode()
         items += (int4(len(data)), data)

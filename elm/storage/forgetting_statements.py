@@ -123,6 +123,8 @@ TOMBSTONES_OF = f"{_TOMBSTONES} WHERE uid = ANY(%(uids)s) ORDER BY id"
 FORGOTTEN_AMONG = "SELECT uid FROM tombstone WHERE uid = ANY(%(uids)s) AND NOT nothing_forgotten()"
 
 RUNS = "SELECT run, at, events, lower(period), upper(period) FROM forgetting ORDER BY at, run"
+RUNS_OF = "SELECT run, at, events, lower(period), upper(period) FROM forgetting WHERE run = ANY(%(runs)s)"
+COUNT_RUNS = "SELECT count(*), coalesce(sum(events), 0)::bigint FROM forgetting"
 PLACES = "SELECT run, kind, frame_id, hull FROM forgetting_place WHERE run = ANY(%(runs)s)"
 
 # Keeping what another memory has

@@ -23,7 +23,7 @@ def merged(rows: Sequence[Sequence[Any]], by: Grouping | ByFeature, names: NameC
         group = Group(
             key=key,
             count=number,
-            duration=timedelta(microseconds=micros),
+            duration=timedelta(microseconds=int(micros)),
             first_begin=moment(first),
             last_end=None if is_open else moment(last),
         )

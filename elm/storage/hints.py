@@ -5,6 +5,17 @@ from __future__ import annotations
 from elm.cues.algebra import And, Cue, DurationCue, KinCue, PayloadCue, TimeCue, TypeCue, UidCue
 from elm.cues.relations import SetRelation, TimeAxis, TypeRelation
 from elm.interval import AllenRelation, Window
+from elm.query import Query
+
+
+def of_query(query: Query) -> tuple[bool, Window]:
+    """Whether a query's cue is pinned, and when what matches begins."""
+    return is_pinned(query.cue), begins_within(query.cue)
+
+
+def conjuncts(cue: Cue) -> tuple[Cue, ...]:
+    """The cues that must all hold for `cue` to hold."""
+    return cue.args if isinstance(cue, And) else (cue,)
 
 
 def is_pinned(cue: Cue) -> bool:

@@ -16,6 +16,7 @@ from elm.storage.server_account import ServerAccount
 
 OLDEST_MAJOR = 14
 EXTENSIONS = ("postgis", "btree_gist")
+"""What a memory needs of the database that it is in."""
 
 _PLACES = (
     "usr/lib/postgresql/*/bin",  # Debian, Ubuntu
@@ -46,6 +47,7 @@ class Installation:
 
     @property
     def major(self) -> int:
+        """The major version, which the data of a server are bound to."""
         return int(re.split(r"\D", self.version, maxsplit=1)[0])
 
     @property

@@ -7,8 +7,18 @@ from sqlalchemy import BigInteger, Select, bindparam, select
 from elm.storage.recall_statements import columns
 from elm.storage.tables import event, log
 
+# The head, and whether there is something to bring in. For who may write nothing of the log there never is: it reads
+# what others brought in; who may write some of it shall hear which rights are missing.
 # The order of `n` finds the first row at once, also where a long inbox was just emptied and not yet vacuumed.
-HEAD = "SELECT seq, (SELECT n FROM log_inbox ORDER BY n LIMIT 1) IS NOT NULL FROM log_head"
+HEAD = """
+SELECT seq, (SELECT n FROM log_inbox ORDER BY n LIMIT 1) IS NOT NULL
+    AND current_setting('transaction_read_only') = 'off'
+    AND (has_table_privilege('log_head'::regclass, 'UPDATE')
+         OR has_table_privilege('log_inbox'::regclass, 'INSERT, DELETE')
+         OR has_table_privilege('log'::regclass, 'INSERT')
+         OR has_table_privilege('consumer'::regclass, 'INSERT, UPDATE'))
+FROM log_head
+"""
 
 # First the lock, then the rows in a statement of its own, whose snapshot has all that whoever held the lock
 # before left behind. A part is committed before its whole is written, so its row has the smaller `n`, and any
@@ -41,6 +51,8 @@ ORDER BY place
 CONSUMERS = "SELECT name, position, checkpoint, state, report, updated_at FROM consumer"
 CONSUMERS_BY_NAME = f"{CONSUMERS} ORDER BY name"
 CONSUMER = f"{CONSUMERS} WHERE name = %(name)s"
+# States may be large, and are read as far as they are asked for.
+PROGRESS = "SELECT name, position, report, updated_at FROM consumer ORDER BY name"
 
 REGISTER = """
 INSERT INTO consumer (name, position, checkpoint, state, report, updated_at)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import datetime
-from itertools import islice
+from itertools import chain, islice
 from threading import Condition
 from typing import Any
 from uuid import UUID
@@ -17,14 +17,17 @@ from elm.errors import StoreClosed
 from elm.event import StoredEvent, content_hash
 from elm.exchange import to_line
 from elm.interval import as_utc
-from elm.query import ByFeature, ConditionRows, Explanation, Group, Grouping, Join, Nearest, Query
+from elm.query import ByFeature, ConditionRows, Explanation, Group, Grouping, Join, Nearest, Order, Query
+from elm.storage.forking import awaited_by_forks
+from elm.storage.hints import conjuncts
 from elm.storage.memory_answers import grouped, nearest_first, neighbours
 from elm.storage.memory_changes import Changes
 from elm.storage.memory_forgetting import Forgetting
-from elm.storage.memory_index import EventIndex, View, conjuncts
+from elm.storage.memory_index import EventIndex, View
 from elm.storage.memory_log import MemoryLog
-from elm.store import Arrival, BatchReport, Closed, Committed, Statistics, TypesAdded
+from elm.store import Arrival, BatchReport, Closed, Committed, ForgettingCount, Statistics, TypesAdded
 from elm.taxonomy import EventType, Taxonomy
+from elm.text import check_memory_name
 from elm.tombstone import Forgotten, RunTombstone, Tombstone
 
 
@@ -32,12 +35,14 @@ class MemoryStore:
     """One memory in this process, behind the port `elm.store.Store`; nothing of it outlives the process.
 
     Every cue is judged by `elm.cues.match`; indexes only spare it events that cannot match. Threads may
-    share a store. An answer is that of one moment, whatever is written while it is read.
+    share a store. An answer is that of one moment, whatever is written while it is read. A forked process has
+    a copy, which goes its own way.
     """
 
     def __init__(self, memory: str = "elm") -> None:
-        self.memory = memory
+        self.memory = check_memory_name(memory)
         self._changed = Condition()
+        awaited_by_forks(self._changed)
         self._is_open = True
         self._taxonomy = Taxonomy()
         self._is_a_links: set[tuple[str, str]] = set()
@@ -133,6 +138,11 @@ class MemoryStore:
         with self._locked():
             return iter(self._forgetting.runs)
 
+    def forgetting_count(self) -> ForgettingCount:
+        """How often this memory has forgotten, and how much."""
+        with self._locked():
+            return self._forgetting.count()
+
     def keep_tombstones(self, given: Sequence[Tombstone | RunTombstone]) -> BatchReport:
         """Keep tombstones of another memory; of an event that this one has, nothing is kept."""
         with self._writing():
@@ -149,6 +159,18 @@ class MemoryStore:
         """The events a query asks for, as of this call; each is judged when it is asked for."""
         (view,) = self._views(query)
         return _answers(view, query)
+
+    def with_parts(self, query: Query) -> Iterator[StoredEvent | Tombstone]:
+        """The events a query asks for and all they are made of, by id, after the tombstones of forgotten parts."""
+        with self._locked():
+            view = self._index.view(query, self._taxonomy)
+            events, ids, tombstones = self._index.events.copy(), self._index.ids.copy(), self._index.tombstones.copy()
+        return _with_parts(_answers(view, query), events, ids, tombstones)
+
+    def everything(self) -> Iterator[StoredEvent | Tombstone | RunTombstone]:
+        """All that the memory holds, as of this call: tombstones of forgettings, those of events, events by id."""
+        with self._locked():
+            return chain(self.run_tombstones(), self.tombstones(), self.find(Query(order=Order.ID)))
 
     def ids(self, query: Query) -> Iterator[int]:
         """Their ids alone."""
@@ -191,7 +213,7 @@ class MemoryStore:
             events=len(self._index.events),
             conditions=tuple(
                 ConditionRows(condition=to_line(cue_to_json(part)), alone=by_itself, left=together)
-                for part, by_itself, together in zip(parts, counts, counts[len(parts) :], strict=False)
+                for part, by_itself, together in zip(parts, counts[: len(parts)], counts[len(parts) :], strict=True)
             ),
         )
 
@@ -229,3 +251,22 @@ def _answers(view: View, query: Query) -> Iterator[StoredEvent]:
     if isinstance(query.order, Nearest):
         candidates = nearest_first(candidates, query.order)
     return islice(view.matching(candidates), query.limit)
+
+
+def _with_parts(
+    found: Iterable[StoredEvent],
+    events: Mapping[int, StoredEvent],
+    ids: Mapping[UUID, int],
+    tombstones: Mapping[UUID, Tombstone],
+) -> Iterator[StoredEvent | Tombstone]:
+    taken: dict[int, StoredEvent | Tombstone] = {}
+    waiting: list[StoredEvent | Tombstone] = [*found]
+    while waiting:
+        each = waiting.pop()
+        if each.id not in taken:
+            taken[each.id] = each
+            if isinstance(each, StoredEvent):
+                waiting += [tombstones[uid] if uid in tombstones else events[ids[uid]] for uid in each.parts]
+    in_order = [taken[number] for number in sorted(taken)]
+    yield from (each for each in in_order if isinstance(each, Tombstone))
+    yield from (each for each in in_order if isinstance(each, StoredEvent))

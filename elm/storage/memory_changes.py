@@ -10,9 +10,10 @@ from uuid import UUID
 from elm.cues.relations import Kin
 from elm.errors import ConflictingContent, ElmError, ForgottenEvent, InvalidValue, UnknownEvent
 from elm.event import Event, StoredEvent, content_hash
+from elm.extents import span
 from elm.interval import Interval, as_utc
 from elm.log import LogKind, Tick
-from elm.storage.memory_events import as_stored, changed, span
+from elm.storage.memory_events import as_stored, changed
 from elm.storage.memory_index import EventIndex
 from elm.storage.parts_first import parts_first
 from elm.store import Arrival, BatchReport, Closed, Committed, Refusal
@@ -118,7 +119,7 @@ class Changes:
 
     def _refuse_lost_parts(self, event: Event, lost: set[UUID]) -> None:
         for part in event.parts:
-            if part in lost and part not in self._index:
+            if part in lost and part not in self._index and part not in self._index.tombstones:
                 raise UnknownEvent(f"event {event.uid} has the part {part}, which was refused: correct that one first")
 
     def close(self, uid: UUID, end: datetime) -> Closed:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from datetime import datetime
 from typing import Any
 
 from elm.errors import ExtentRefused
 from elm.event import Event, StoredEvent
+from elm.extents import common_agent, in_uid_order, span
 from elm.geometry import Region, derived_region, same_extent
-from elm.interval import Interval
 from elm.tombstone import Tombstone
 
 
@@ -19,18 +19,16 @@ def as_stored(
     """The event as a memory keeps it; `parts` are its stored parts, from which its extents derive."""
     interval, region, subject, agent = event.interval, event.region, event.subject, event.agent
     if parts:
-        in_uid_order = sorted(parts, key=lambda part: part.uid)
         interval = span(part.interval for part in parts)
         if event.interval not in (None, interval):
             raise ExtentRefused(
                 f"event {event.uid} cannot have the interval {event.interval}: that of its parts is {interval}. "
                 f"Leave the interval out, or commit an instant for the bound and make it a part"
             )
-        region = _derived(event, "region", event.region, [part.region for part in in_uid_order])
-        subject = _derived(event, "subject", event.subject, [part.subject for part in in_uid_order])
-        agents = {part.agent for part in parts}
-        if agent is None and len(agents) == 1:
-            (agent,) = agents
+        ordered = in_uid_order(parts)
+        region = _derived(event, "region", event.region, [part.region for part in ordered])
+        subject = _derived(event, "subject", event.subject, [part.subject for part in ordered])
+        agent = common_agent(parts) if agent is None else agent
     assert interval is not None  # noqa: S101 - an event without parts has one from birth
     return StoredEvent(
         id=number,
@@ -55,14 +53,6 @@ def _derived(event: Event, name: str, given: Region | None, parts: list[Region |
             f"Leave the {name} out: it derives"
         )
     return derived
-
-
-def span(intervals: Iterable[Interval]) -> Interval:
-    """From the first begin to the last end; open when one of them is (Def 7)."""
-    known = list(intervals)
-    ends = [interval.end for interval in known if interval.end is not None]
-    begin = min(interval.begin for interval in known)
-    return Interval(begin=begin, end=max(ends) if len(ends) == len(known) else None)
 
 
 def changed(event: StoredEvent, **fields: Any) -> StoredEvent:

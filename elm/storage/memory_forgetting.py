@@ -11,10 +11,10 @@ from uuid import UUID
 import msgspec
 
 from elm.event import StoredEvent
+from elm.extents import span
 from elm.geometry import Region, derived_region
-from elm.storage.memory_events import span
 from elm.storage.memory_index import EventIndex
-from elm.store import BatchReport, Refusal
+from elm.store import BatchReport, ForgettingCount, Refusal
 from elm.tombstone import Forgotten, RunTombstone, Tombstone, other_tombstone
 
 _ROW = 200
@@ -33,6 +33,10 @@ class Forgetting:
     def runs(self) -> list[RunTombstone]:
         """What is left of the rest of each forgetting, oldest first."""
         return sorted(self._runs.values(), key=lambda run: (run.at, run.run))
+
+    def count(self) -> ForgettingCount:
+        """How many runs there were, and of how many events they tell."""
+        return ForgettingCount(runs=len(self._runs), events=sum(run.events for run in self._runs.values()))
 
     def forget(self, ids: Sequence[int], *, run: UUID, at: datetime) -> Forgotten:
         """Forget those of these events that have ended."""

@@ -17,6 +17,7 @@ from elm.event import StoredEvent
 from elm.geometry import SpatialRelation
 from elm.interval import to_micros
 from elm.query import Cursor, Nearest, Order, Query
+from elm.storage.hints import conjuncts
 from elm.storage.memory_events import changed
 from elm.taxonomy import Taxonomy
 from elm.tombstone import Tombstone
@@ -40,12 +41,7 @@ def conditions(cue: Cue) -> Iterator[Condition]:
         yield cue
 
 
-def conjuncts(cue: Cue) -> tuple[Cue, ...]:
-    """The cues that must all hold for `cue` to hold."""
-    return cue.args if isinstance(cue, And) else (cue,)
-
-
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Kinship:
     """Who is part of whom, among the given events by id, and the wholes of tombstones; `ids` may know more than those.
 
@@ -77,7 +73,7 @@ class Kinship:
         return event.parts if kin is Kin.PARTS else event.wholes
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class View:
     """The candidates for one query as the memory stood at one moment, and what judging them takes."""
 
@@ -201,7 +197,8 @@ class EventIndex:
 
     def kin(self, uid: UUID, kin: Kin, *, transitive: bool) -> Set[UUID]:
         """The direct parts or wholes of an event, or all of Def 4 when transitive."""
-        return Kinship(self.events, self.ids, self._wholes_of_tombstones).of(uid, kin, transitive=transitive)
+        known = Kinship(events=self.events, ids=self.ids, forgotten=self._wholes_of_tombstones)
+        return known.of(uid, kin, transitive=transitive)
 
     def view(self, query: Query, taxonomy: Taxonomy) -> View:
         """The candidates for `query` in its order (by id for the nearest); unknown types in its cue are refused."""
@@ -213,12 +210,12 @@ class EventIndex:
             cue=query.cue,
             candidates=[self.events[number] for number in self._ordered(self._narrowed(query.cue), order, query.after)],
             descendants=descendants,
-            kinship=self._kinship() if asks_for_kin else Kinship({}, {}, {}),
+            kinship=self._kinship() if asks_for_kin else Kinship(events={}, ids={}, forgotten={}),
         )
 
     def _kinship(self) -> Kinship:
         """Who is part of whom, as it is now."""
-        return Kinship(self.events.copy(), self.ids.copy(), self._wholes_of_tombstones.copy())
+        return Kinship(events=self.events.copy(), ids=self.ids.copy(), forgotten=self._wholes_of_tombstones.copy())
 
     def _position(self, number: int) -> Position:
         return to_micros(self.events[number].interval.begin), number

@@ -14,9 +14,10 @@ import msgspec
 
 from elm.event import content_hash
 from elm.log import (
+    Advance,
     Consumer,
     LogEntry,
-    Step,
+    Progress,
     Tick,
     beyond_the_end,
     check_position,
@@ -98,6 +99,13 @@ class MemoryLog:
         with self._locked():
             return [self._consumers[name] for name in sorted(self._consumers)]
 
+    def progress(self) -> list[Progress]:
+        """How far all consumers got, by name, without what they know."""
+        return [
+            Progress(name=each.name, position=each.position, report=each.report, updated_at=each.updated_at)
+            for each in self.consumers()
+        ]
+
     def consumer(self, name: str) -> Consumer | None:
         """The consumer of this name."""
         with self._locked():
@@ -120,31 +128,31 @@ class MemoryLog:
                 )
             return self._consumers[name]
 
-    def advance(self, steps: Sequence[Step], results: Sequence[Arrival] = ()) -> list[Committed]:
+    def advance(self, advances: Sequence[Advance], results: Sequence[Arrival] = ()) -> list[Committed]:
         """Commit results and move consumers on, all or nothing.
 
-        A consumer that is not at its step's `before` refuses the whole call with `PositionLost`.
+        A consumer that is not at the `before` of its advance refuses the whole call with `PositionLost`.
         """
         contents = [content_hash(arrival.event) for arrival in results]
         with self._locked():
             moved: dict[str, Consumer] = {}
-            for step in steps:
-                moved[step.name] = self._after(step, moved.get(step.name) or self._known(step.name))
+            for each in advances:
+                moved[each.name] = self._after(each, moved.get(each.name) or self._known(each.name))
             done = self._changes.keep(results, contents)
             self._consumers.update(moved)
             self._changed.notify_all()
             return done
 
-    def _after(self, step: Step, consumer: Consumer) -> Consumer:
-        if consumer.position != step.before:
-            raise position_lost(step, consumer.position)
-        self._check_reached(step.name, step.position)
+    def _after(self, advance: Advance, consumer: Consumer) -> Consumer:
+        if consumer.position != advance.before:
+            raise position_lost(advance, consumer.position)
+        self._check_reached(advance.name, advance.position)
         return replace(
             consumer,
-            position=step.position,
-            checkpoint=consumer.checkpoint if step.state is None else step.position,
-            state=consumer.state if step.state is None else step.state,
-            report=_as_kept(step.report),
+            position=advance.position,
+            checkpoint=consumer.checkpoint if advance.state is None else advance.position,
+            state=consumer.state if advance.state is None else advance.state,
+            report=_as_kept(advance.report),
             updated_at=datetime.now(UTC),
         )
 

@@ -13,8 +13,10 @@ from sqlalchemy.exc import DBAPIError
 from alembic import command
 from elm.errors import DatabaseUnfit
 from elm.storage.connections import Connection, open_connection, translated
-from elm.storage.schema import EXTENSIONS, check_memory_name, check_revision, older_revisions, revision_of, scripts
+from elm.storage.installation import EXTENSIONS
+from elm.storage.schema import check_revision, older_revisions, revision_of, scripts
 from elm.storage.tables import REVISION
+from elm.text import check_memory_name
 
 _LOCK = 0x656C6D  # "elm": creating and migrating memories of one database take turns
 _ALONE = Lock()  # alembic keeps the connection that it works on in a global of the process

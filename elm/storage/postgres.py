@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from datetime import UTC, datetime
 from functools import partial
 from itertools import islice
@@ -10,34 +10,34 @@ from typing import Any
 from uuid import UUID
 
 import psycopg
-from sqlalchemy import Select
 
 from elm.cues.algebra import Cue
 from elm.cues.codec import cue_to_json
+from elm.errors import MemoryMissing
 from elm.event import StoredEvent
 from elm.exchange import to_line
-from elm.interval import Window
 from elm.query import MOST_ID, ByFeature, ConditionRows, Explanation, Group, Grouping, Join, Nearest, Query
 from elm.storage import batch_loading, event_writing, grouping, hints, recall_statements, type_writing
 from elm.storage import write_statements as sql
 from elm.storage.batch import made_ready
 from elm.storage.connections import Connection, repeated
-from elm.storage.cue_compiler import CompiledCue, compile_cue
+from elm.storage.one_moment import by_ids, everything, one_moment, pieces, with_parts
 from elm.storage.postgres_forgetting import PostgresForgetting
 from elm.storage.postgres_log import PostgresLog
 from elm.storage.rows import moment
-from elm.storage.session import Session
+from elm.storage.session import Session, check_values
 from elm.storage.writing_together import Together
 from elm.store import Arrival, BatchReport, Closed, Committed, Statistics, TypesAdded
 from elm.taxonomy import EventType
+from elm.tombstone import RunTombstone, Tombstone
 
-CHUNK = 1_000
-"""Rows that a streamed result holds in this process at a time."""
+CHUNK = 100
+"""Rows that a streamed result holds in this process at a time: their payloads may be images."""
 _CHUNKED = psycopg.capabilities.has_stream_chunked()
 
 
 class PostgresStore(PostgresForgetting):
-    """The `Store` over one schema of a PostgreSQL database; safe to share between threads."""
+    """The `Store` over one schema of a PostgreSQL database; safe to share between threads and with a forked process."""
 
     def __init__(self, dsn: str, memory: str) -> None:
         self._session = Session(dsn, memory)
@@ -45,7 +45,6 @@ class PostgresStore(PostgresForgetting):
         self.log = PostgresLog(self._session)
         self._connections = self._session.connections
         self._names = self._session.names
-        self._statements = self._session.statements
 
     # Types
 
@@ -102,14 +101,18 @@ class PostgresStore(PostgresForgetting):
 
     def finish_load(self) -> None:
         """Bring the planner's statistics up to date, and what it may read from indexes alone."""
-        self._session.ready_to_write()
+        try:
+            self._session.ready_to_change()
+        except MemoryMissing:
+            # A load of nothing creates no memory.
+            return
         with self._connections.writing() as connection:
             connection.execute(sql.TIDY)
 
     @repeated
     def close_event(self, uid: UUID, end: datetime) -> Closed:
         """End an open event and recompute the extents of all its wholes; the same end again changes nothing."""
-        self._session.ready_to_write()
+        self._session.ready_to_change()
         with self._connections.writing() as connection:
             with connection.transaction():
                 closed = event_writing.close(connection, uid, end)
@@ -123,43 +126,51 @@ class PostgresStore(PostgresForgetting):
 
     def find(self, query: Query) -> Iterator[StoredEvent]:
         """The events a query asks for, streamed from one consistent view."""
-        text, values = self._asked("find", query, recall_statements.find)
+        text, values = self._session.asked("find", query, recall_statements.find)
         named = hints.is_named(query.cue) and not isinstance(query.order, Nearest)
         if named or hints.is_pinned(query.cue) or (query.limit is not None and query.limit <= CHUNK):
             return self._events(text, values, named=named)
         return self._streamed_events(text, values)
 
+    def with_parts(self, query: Query) -> Iterator[StoredEvent | Tombstone]:
+        """The events a query asks for and all they are made of, by id, after the tombstones of forgotten parts."""
+        return with_parts(self._session, query)
+
+    def everything(self) -> Iterator[StoredEvent | Tombstone | RunTombstone]:
+        """All that the memory holds, as of one moment: tombstones of forgettings, those of events, events by id."""
+        return everything(self._session)
+
     def ids(self, query: Query) -> Iterator[int]:
         """Their ids alone."""
-        text, values = self._asked("ids", query, recall_statements.find_ids)
+        text, values = self._session.asked("ids", query, recall_statements.find_ids)
         with self._connections.recalling() as connection:
             for row in self._stream(connection, text, values):
                 yield row[0]
 
     def count(self, cue: Cue) -> int:
         """How many events match."""
-        compiled = self._compiled(cue)
-        text = self._statements.text(("count", compiled.key), lambda: recall_statements.count(compiled))
+        compiled = self._session.compiled(cue)
+        text = self._session.statements.text(("count", compiled.key), lambda: recall_statements.count(compiled))
         return int(self._one(text, compiled.values)[0])
 
     def exists(self, cue: Cue) -> bool:
         """Whether any event matches."""
-        compiled = self._compiled(cue)
-        text = self._statements.text(("exists", compiled.key), lambda: recall_statements.any_match(compiled))
+        compiled = self._session.compiled(cue)
+        text = self._session.statements.text(("exists", compiled.key), lambda: recall_statements.any_match(compiled))
         return bool(self._all(text, compiled.values))
 
     def get(self, ids: Sequence[int]) -> list[StoredEvent]:
         """The events with these ids, in id order; unknown ids are left out."""
         self._session.ready_to_recall()
-        text = self._statements.text("by id", recall_statements.by_ids)
+        text = self._session.statements.text("by id", recall_statements.by_ids)
         possible = [number for number in ids if 0 < number <= MOST_ID]
         return list(self._events(text, {"ids": possible}, named=True))
 
     def groups(self, cue: Cue, by: Grouping | ByFeature) -> list[Group]:
         """The matching events by key, keys in ascending order, None last."""
-        compiled = self._compiled(cue)
+        compiled = self._session.compiled(cue)
         key = ("groups", compiled.key, by if isinstance(by, Grouping) else "feature")
-        text = self._statements.text(key, lambda: recall_statements.groups(compiled, by))
+        text = self._session.statements.text(key, lambda: recall_statements.groups(compiled, by))
         values = compiled.values if isinstance(by, Grouping) else {**compiled.values, "feature_name": by.name}
         with self._connections.recalling() as connection:
             rows = connection.execute(text, values, binary=True).fetchall()
@@ -171,27 +182,28 @@ class PostgresStore(PostgresForgetting):
 
     def join(self, join: Join) -> Iterator[tuple[StoredEvent, StoredEvent | None]]:
         """Each anchor, in order, with the neighbour found for it."""
-        anchors, other = self._compiled(join.anchors.cue), self._compiled(join.cue, prefix="n")
-        pinned, near = _hints(join.anchors)
+        anchors, other = self._session.compiled(join.anchors.cue), self._session.compiled(join.cue, prefix="n")
+        check_values(len(anchors.values) + len(other.values))
+        pinned, near = hints.of_query(join.anchors)
         shape = recall_statements.shape(join.anchors, pinned=pinned, near=near)
         key = ("join", anchors.key, other.key, join.relation, join.same_region, shape)
-        text = self._statements.text(
+        text = self._session.statements.text(
             key, lambda: recall_statements.join(anchors, other, join, pinned=pinned, near=near)
         )
         own = recall_statements.parameters(join.anchors, near=near)
-        with self._connections.recalling() as connection:
-            pairs = self._stream(connection, text, {**anchors.values, **other.values, **own})
-            while chunk := list(islice(pairs, CHUNK)):
-                wanted = {number for pair in chunk for number in pair if number is not None}
-                known = {event.id: event for event in self.get(sorted(wanted))}
-                for anchor, neighbour in chunk:
+        values = {**anchors.values, **other.values, **own}
+        with one_moment(self._session) as connection:
+            for pairs in pieces(connection, text, values, size=CHUNK):
+                wanted = {number for pair in pairs for number in pair if number is not None}
+                known = {event.id: event for event in by_ids(self._session, connection, sorted(wanted))}
+                for anchor, neighbour in pairs:
                     yield known[anchor], known[neighbour] if neighbour is not None else None
 
     def explain(self, query: Query) -> Explanation:
         """How the query is answered; it is run for that."""
-        text, values = self._asked("find", query, recall_statements.find)
-        parts = recall_statements.conditions_of(query.cue)
-        compiled = [self._compiled(part, prefix=f"c{index}_") for index, part in enumerate(parts)]
+        text, values = self._session.asked("find", query, recall_statements.find)
+        parts = hints.conjuncts(query.cue)
+        compiled = [self._session.compiled(part, prefix=f"c{index}_") for index, part in enumerate(parts)]
         removed = str(recall_statements.removed(compiled).compile(dialect=recall_statements.DIALECT))
         with self._connections.recalling() as connection:
             plan = connection.execute(f"EXPLAIN (ANALYZE, BUFFERS) {text}", values).fetchall()
@@ -217,7 +229,7 @@ class PostgresStore(PostgresForgetting):
         from elm.columns import reader_of
         from elm.storage import arrow_rows
 
-        text, values = self._asked("find", query, recall_statements.find)
+        text, values = self._session.asked("find", query, recall_statements.find)
 
         def batches() -> Iterator[Any]:
             with self._connections.recalling() as connection:
@@ -253,17 +265,6 @@ class PostgresStore(PostgresForgetting):
 
     # How statements are run
 
-    def _asked(self, kind: str, query: Query, build: Callable[..., Select[Any]]) -> tuple[str, dict[str, Any]]:
-        compiled = self._compiled(query.cue)
-        pinned, near = _hints(query)
-        key = (kind, compiled.key, recall_statements.shape(query, pinned=pinned, near=near))
-        text = self._statements.text(key, lambda: build(compiled, query, pinned=pinned, near=near))
-        return text, {**compiled.values, **recall_statements.parameters(query, near=near)}
-
-    def _compiled(self, cue: Cue, *, prefix: str = "p") -> CompiledCue:
-        self._session.ready_to_recall()
-        return compile_cue(cue, self._names, prefix=prefix)
-
     def _events(self, text: str, values: dict[str, Any], *, named: bool) -> Iterator[StoredEvent]:
         """A few events, fetched at once; named ones by a prepared statement, which is planned once."""
         with self._connections.recalling(named=named) as connection:
@@ -292,7 +293,3 @@ class PostgresStore(PostgresForgetting):
 
     def _one(self, text: str, values: dict[str, Any]) -> Any:
         return self._all(text, values)[0]
-
-
-def _hints(query: Query) -> tuple[bool, Window]:
-    return hints.is_pinned(query.cue), hints.begins_within(query.cue)

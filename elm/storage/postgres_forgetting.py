@@ -10,7 +10,7 @@ from elm.geometry import Region
 from elm.storage import batch_forgetting, tombstone_rows
 from elm.storage.connections import repeated
 from elm.storage.session import Session
-from elm.store import BatchReport
+from elm.store import BatchReport, ForgettingCount
 from elm.tombstone import Forgotten, RunTombstone, Tombstone
 
 
@@ -43,6 +43,12 @@ class PostgresForgetting:
         self._session.ready_to_recall()
         with self._session.connections.recalling() as connection:
             yield from tombstone_rows.run_tombstones(connection, self._session.frame_name)
+
+    def forgetting_count(self) -> ForgettingCount:
+        """How often this memory has forgotten, and how much."""
+        self._session.ready_to_recall()
+        with self._session.connections.recalling() as connection:
+            return tombstone_rows.count(connection)
 
     @repeated
     def keep_tombstones(self, given: Sequence[Tombstone | RunTombstone]) -> BatchReport:

@@ -14,10 +14,11 @@ import psycopg
 
 from elm.event import StoredEvent
 from elm.log import (
+    Advance,
     Consumer,
     LogEntry,
     LogKind,
-    Step,
+    Progress,
     Tick,
     beyond_the_end,
     check_position,
@@ -27,7 +28,7 @@ from elm.log import (
 from elm.storage import log_statements as sql
 from elm.storage.connections import Connection, repeated
 from elm.storage.log_signals import Ear, News, exclusive
-from elm.storage.rows import moment
+from elm.storage.rows import Column, moment
 from elm.storage.session import Session
 from elm.storage.tables import LOG_CLOSE, LOG_COMMIT, LOG_OPEN, LOG_PUNCTUATION, LOG_TICK
 from elm.storage.writing_together import Together
@@ -39,7 +40,7 @@ SEQUENCED_AT_ONCE = 50_000
 POLL = 0.02
 """Seconds after which a waiting reader looks by itself: not every commit is told of."""
 
-_EVENT_COLUMNS = 15
+_EVENT_COLUMNS = len(Column)
 _KINDS = {
     LOG_COMMIT: LogKind.COMMIT,
     LOG_CLOSE: LogKind.CLOSE,
@@ -61,7 +62,11 @@ class PostgresLog:
     # Entries
 
     def head(self) -> int:
-        """Bring everything committed so far into the log; the position of the last entry, 0 when there is none."""
+        """Bring everything committed so far into the log; the position of the last entry, 0 when there is none.
+
+        Who may only read the tables of the log, or is connected to a database that is read-only, gets the last entry
+        of those that others brought in.
+        """
         self._session.ready_to_recall()
         with self._connections.recalling() as connection:
             return _sequenced(connection)
@@ -139,6 +144,10 @@ class PostgresLog:
         """All consumers, by name."""
         return [_consumer(row) for row in self._recalled(sql.CONSUMERS_BY_NAME, {})]
 
+    def progress(self) -> list[Progress]:
+        """How far all consumers got, by name, without what they know."""
+        return [_progress(row) for row in self._recalled(sql.PROGRESS, {})]
+
     def consumer(self, name: str) -> Consumer | None:
         """The consumer of this name."""
         return next((_consumer(row) for row in self._recalled(sql.CONSUMER, {"name": name})), None)
@@ -157,20 +166,20 @@ class PostgresLog:
         return _consumer(row)
 
     @repeated
-    def advance(self, steps: Sequence[Step], results: Sequence[Arrival] = ()) -> list[Committed]:
+    def advance(self, advances: Sequence[Advance], results: Sequence[Arrival] = ()) -> list[Committed]:
         """Commit results and move consumers on, all in one transaction.
 
-        A consumer that is not at its step's `before` refuses the whole call with `PositionLost`: another
+        A consumer that is not at the `before` of its advance refuses the whole call with `PositionLost`: another
         process has done the work.
         """
         self._session.ready_to_write()
         together = Together(results, self._session.names)
         with self._connections.writing() as connection:
             with connection.transaction():
-                # First the steps: who comes second waits there, and finds its position lost before it wrote anything.
+                # First the consumers: who comes second waits there, and finds its position lost before it writes.
                 # In order of names, so that two that move the same consumers do not wait for each other.
-                for step in sorted(steps, key=lambda step: step.name):
-                    _advance(connection, step)
+                for each in sorted(advances, key=lambda each: each.name):
+                    _advance(connection, each)
                 done = together.commit(connection, partial(self._session.stored, connection))
             if results:
                 self.tell(connection)
@@ -180,7 +189,7 @@ class PostgresLog:
     def rewind(self, name: str, position: int) -> None:
         """Have a consumer begin again behind `position`, without state."""
         check_position(position)
-        self._session.ready_to_write()
+        self._session.ready_to_change()
         with self._connections.writing() as connection:
             values = {"name": name, "position": position, "now": datetime.now(UTC)}
             if connection.execute(sql.REWIND, values).rowcount == 0:
@@ -189,7 +198,7 @@ class PostgresLog:
 
     def remove(self, name: str) -> None:
         """Forget a consumer; an unknown one is no error."""
-        self._session.ready_to_write()
+        self._session.ready_to_change()
         with self._connections.writing() as connection:
             connection.execute(sql.REMOVE, {"name": name})
 
@@ -225,9 +234,9 @@ class PostgresLog:
 
 
 def _sequenced(connection: Connection) -> int:
-    """The head of the log after everything committed by now has entered it."""
-    ((head, is_waiting),) = connection.execute(sql.HEAD).fetchall()
-    moved = SEQUENCED_AT_ONCE if is_waiting else 0
+    """The head of the log after everything committed by now has entered it, where the user may see to that."""
+    ((head, is_to_enter),) = connection.execute(sql.HEAD).fetchall()
+    moved = SEQUENCED_AT_ONCE if is_to_enter else 0
     # Fewer than asked for were all there were: not until the inbox is empty, for others go on writing.
     while moved == SEQUENCED_AT_ONCE:
         with connection.transaction():
@@ -236,21 +245,21 @@ def _sequenced(connection: Connection) -> int:
     return int(head)
 
 
-def _advance(connection: Connection, step: Step) -> None:
+def _advance(connection: Connection, advance: Advance) -> None:
     values = {
-        "name": step.name,
-        "before": step.before,
-        "position": step.position,
-        "state": step.state,
-        "report": msgspec.json.encode(dict(step.report)).decode(),
+        "name": advance.name,
+        "before": advance.before,
+        "position": advance.position,
+        "state": advance.state,
+        "report": msgspec.json.encode(dict(advance.report)).decode(),
         "now": datetime.now(UTC),
     }
-    statement = sql.ADVANCE if step.state is None else sql.ADVANCE_CHECKPOINT
+    statement = sql.ADVANCE if advance.state is None else sql.ADVANCE_CHECKPOINT
     if connection.execute(statement, values).rowcount == 0:
-        found = _known_position(connection, step.name)
-        if found != step.before:
-            raise position_lost(step, found)
-        raise beyond_the_end(step.name, step.position, _head(connection))
+        found = _known_position(connection, advance.name)
+        if found != advance.before:
+            raise position_lost(advance, found)
+        raise beyond_the_end(advance.name, advance.position, _head(connection))
 
 
 def _known_position(connection: Connection, name: str) -> int:
@@ -275,3 +284,8 @@ def _consumer(row: Sequence[Any]) -> Consumer:
         report=msgspec.json.decode(report),
         updated_at=moment(updated_at),
     )
+
+
+def _progress(row: Sequence[Any]) -> Progress:
+    name, position, report, updated_at = row
+    return Progress(name=name, position=position, report=msgspec.json.decode(report), updated_at=moment(updated_at))

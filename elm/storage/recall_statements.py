@@ -8,7 +8,6 @@ from typing import Any
 
 from sqlalchemy import (
     ARRAY,
-    TIMESTAMP,
     BigInteger,
     Boolean,
     ColumnElement,
@@ -30,7 +29,6 @@ from sqlalchemy import (
 )
 from sqlalchemy.dialects.postgresql import psycopg
 
-from elm.cues.algebra import And, Cue
 from elm.interval import Window
 from elm.query import ByFeature, Grouping, Join, JoinRelation, Nearest, Query
 from elm.storage.cue_compiler import CompiledCue
@@ -49,14 +47,19 @@ from elm.storage.row_search import (
     walks,
 )
 from elm.storage.row_search import WALK_MOST as WALK_MOST
+from elm.storage.rows import Column
 from elm.storage.tables import event, part
 
 DIALECT = psycopg.dialect()  # type: ignore[no-untyped-call]
-_TIME = TIMESTAMP(timezone=True)
 
 
 class StatementCache:
-    """SQL texts by shape: building one costs a hundred times what finding it does."""
+    """SQL texts by shape: building one costs a hundred times what finding it does.
+
+    Shapes have no end, for cues combine at will: beyond `MOST` texts the oldest goes, and is built anew if asked for.
+    """
+
+    MOST = 1_000
 
     def __init__(self) -> None:
         self._texts: dict[Any, str] = {}
@@ -65,34 +68,42 @@ class StatementCache:
     def text(self, key: Any, build: Callable[[], Select[Any]]) -> str:
         """The SQL text of the statement that `key` stands for."""
         known = self._texts.get(key)
-        if known is None:
-            with self._lock:
-                known = self._texts[key] = str(build().compile(dialect=DIALECT))
+        if known is not None:
+            return known
+        with self._lock:
+            # Another thread may have built it while this one waited.
+            known = self._texts.get(key)
+            if known is None:
+                known = str(build().compile(dialect=DIALECT))
+                if len(self._texts) >= self.MOST:
+                    del self._texts[next(iter(self._texts))]
+                self._texts[key] = known
         return known
 
 
 def columns(e: FromClause) -> list[ColumnElement[Any]]:
-    """What the decoders of `rows` read, in their order."""
+    """What the decoders of `rows` read, where `Column` says."""
     links = part.alias("up")
     wholes = select(links.c.whole_uid).where(links.c.part_id == e.c.id).order_by(links.c.whole_id)
-    return [
-        e.c.id,
-        e.c.uid,
-        e.c.type_id,
-        e.c.period,
-        e.c.frame_id,
+    values: dict[Column, ColumnElement[Any]] = {
+        Column.ID: e.c.id,
+        Column.UID: e.c.uid,
+        Column.TYPE_ID: e.c.type_id,
+        Column.PERIOD: e.c.period,
+        Column.FRAME_ID: e.c.frame_id,
         # As it is stored: the geometry type would put a conversion around it.
-        type_coerce(e.c.region, LargeBinary),
-        e.c.subject_frame_id,
-        type_coerce(e.c.subject, LargeBinary),
-        e.c.features,
-        e.c.agent,
-        e.c.media_type,
-        e.c.payload,
-        e.c.parts,
-        func.array(wholes.scalar_subquery()).label("wholes"),
-        e.c.recorded_at,
-    ]
+        Column.REGION: type_coerce(e.c.region, LargeBinary),
+        Column.SUBJECT_FRAME_ID: e.c.subject_frame_id,
+        Column.SUBJECT: type_coerce(e.c.subject, LargeBinary),
+        Column.FEATURES: e.c.features,
+        Column.AGENT: e.c.agent,
+        Column.MEDIA_TYPE: e.c.media_type,
+        Column.PAYLOAD: e.c.payload,
+        Column.PARTS: e.c.parts,
+        Column.WHOLES: func.array(wholes.scalar_subquery()).label("wholes"),
+        Column.RECORDED_AT: e.c.recorded_at,
+    }
+    return [values[each] for each in Column]
 
 
 # Which events, in which order
@@ -179,7 +190,8 @@ def _feature_values() -> tuple[list[ColumnElement[Any]], Any]:
 
 def _sums(keys: list[ColumnElement[Any]], source: Any, compiled: CompiledCue) -> Select[Any]:
     lasted = extract("epoch", func.upper(event.c.period) - begin(event))
-    micros = func.coalesce(func.sum(lasted * literal_column("1000000")), literal_column("0")).cast(BigInteger)
+    # A numeric: a few events that lasted for ages are together more microseconds than a bigint holds.
+    micros = func.coalesce(func.sum(lasted * literal_column("1000000")), literal_column("0"))
     return (
         select(
             *keys,
@@ -228,11 +240,6 @@ def removed(conditions: list[CompiledCue]) -> Select[Any]:
         counts.append(func.count().filter(condition))
         counts.append(func.count().filter(and_(*built[: index + 1])))
     return select(*counts).select_from(event)
-
-
-def conditions_of(cue: Cue) -> tuple[Cue, ...]:
-    """The conditions that a cue asks for together."""
-    return cue.args if isinstance(cue, And) else (cue,)
 
 
 def by_ids() -> Select[Any]:

@@ -7,7 +7,6 @@ from typing import Any
 
 from geoalchemy2 import Geometry
 from sqlalchemy import (
-    TIMESTAMP,
     BigInteger,
     ColumnElement,
     Double,
@@ -31,12 +30,10 @@ from elm.cues.algebra import And
 from elm.cues.relations import Place
 from elm.interval import Window
 from elm.query import Nearest, Order, Query
-from elm.storage.conditions.rule import Bind, Condition
+from elm.storage.conditions.rule import TIME, Bind, SqlCondition
 from elm.storage.cue_compiler import CompiledCue
 from elm.storage.hints import is_guess, is_in_order
 from elm.storage.tables import event, frame
-
-_TIME = TIMESTAMP(timezone=True)
 
 WALK_FEWEST, WALK_MOST, WALK_FACTOR = 500, 2_000, 20
 """How far the begin index is walked for a limited answer before the candidates are collected instead."""
@@ -116,7 +113,7 @@ def _first(compiled: CompiledCue, query: Query, near: Window) -> Any:
     """
     limit = bindparam("limit", type_=BigInteger)
     steps: list[Select[Any]] = []
-    unsolved: list[Condition] = []
+    unsolved: list[SqlCondition] = []
     if compiled.search is not None:
         glance = _walked(compiled, query, near, "glance", [])
         short = _count(glance) < limit
@@ -142,15 +139,15 @@ def _first(compiled: CompiledCue, query: Query, near: Window) -> Any:
     return select(found).order_by(*keys(query, found)).limit(limit).subquery("ids")
 
 
-def _walked(compiled: CompiledCue, query: Query, near: Window, name: str, when: list[Condition]) -> Any:
+def _walked(compiled: CompiledCue, query: Query, near: Window, name: str, when: list[SqlCondition]) -> Any:
     """What matches among the next rows in order, of which parameter `name` says how many, up to the limit."""
-    bounds: list[Condition] = []
+    bounds: list[SqlCondition] = []
     # Only where the walk goes along the begins do these bound it.
     along_begin = query.order is not Order.ID
     if along_begin and near.begin is not None:
-        bounds.append(begin(event) >= bindparam("near_begin", type_=_TIME))
+        bounds.append(begin(event) >= bindparam("near_begin", type_=TIME))
     if along_begin and near.end is not None:
-        bounds.append(begin(event) <= bindparam("near_end", type_=_TIME))
+        bounds.append(begin(event) <= bindparam("near_end", type_=TIME))
     # The begin as a column: by it the planner knows that the rows are in order, and stops at the limit.
     rows = select(event, *_place(event)).where(*bounds, *_after(query, event)).order_by(*order(query))
     rows_near = rows.limit(bindparam(name, type_=Integer)).subquery("near")
@@ -160,7 +157,7 @@ def _walked(compiled: CompiledCue, query: Query, near: Window, name: str, when: 
     return ordered.limit(bindparam("limit", type_=BigInteger)).cte(name).prefix_with("MATERIALIZED")
 
 
-def _stretch(compiled: CompiledCue, query: Query, walk: Any, limit: Bind, when: list[Condition]) -> Any:
+def _stretch(compiled: CompiledCue, query: Query, walk: Any, limit: Bind, when: list[SqlCondition]) -> Any:
     """All that match within the time in which enough should, if they go on as densely as on the walk.
 
     Types have an index that knows begins too: a type below many others costs a probe there, and not all it ever
@@ -202,7 +199,7 @@ def _events() -> ColumnElement[Any]:
 
 
 def _searched(
-    compiled: CompiledCue, search: Callable[[FromClause], Condition], query: Query, when: Condition, most: Bind
+    compiled: CompiledCue, search: Callable[[FromClause], SqlCondition], query: Query, when: SqlCondition, most: Bind
 ) -> Any:
     """What an index finds for the cue, in no order, and one more than `most` if there are more."""
     wanted = [event.c.id] if compiled.is_search else [event]
@@ -210,7 +207,7 @@ def _searched(
     return found.limit(most + literal_column("1")).cte("handful").prefix_with("MATERIALIZED")
 
 
-def _collected(compiled: CompiledCue, query: Query, when: list[Condition]) -> Select[Any]:
+def _collected(compiled: CompiledCue, query: Query, when: list[SqlCondition]) -> Select[Any]:
     return select(*_place(event), event.c.id).where(*when, *conditions(compiled, query, event))
 
 
@@ -233,23 +230,23 @@ def keys(query: Query, found: FromClause) -> list[ColumnElement[Any]]:
     return [found.c.begin, found.c.id]
 
 
-def conditions(compiled: CompiledCue, query: Query, e: FromClause) -> list[Condition]:
+def conditions(compiled: CompiledCue, query: Query, e: FromClause) -> list[SqlCondition]:
     """What a row of an answer fulfils: the cue, to come after a cursor, to be in the frame of a distance."""
     return [compiled.condition(e), *_after(query, e), *_placed(query, e)]
 
 
-def _after(query: Query, e: FromClause) -> list[Condition]:
+def _after(query: Query, e: FromClause) -> list[SqlCondition]:
     if query.after is None:
         return []
     number = bindparam("after_id", type_=BigInteger)
     if query.order is Order.ID:
         return [e.c.id > number]
     here = tuple_(begin(e), e.c.id)
-    there = tuple_(bindparam("after_begin", type_=_TIME), number)
+    there = tuple_(bindparam("after_begin", type_=TIME), number)
     return [here > there if query.order is Order.BEGIN else here < there]
 
 
-def _placed(query: Query, e: FromClause) -> list[Condition]:
+def _placed(query: Query, e: FromClause) -> list[SqlCondition]:
     if not isinstance(query.order, Nearest):
         return []
     # The frame by name: a nearest order has no cue whose frame number would be at hand.

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Callable, Mapping, Sequence
-from datetime import UTC, datetime, timedelta
+from datetime import datetime
+from enum import IntEnum
 from typing import Any
 from uuid import UUID
 
@@ -14,36 +14,64 @@ from elm.event import Payload
 from elm.features import Feature
 from elm.geometry import Region
 from elm.interval import Interval
+from elm.storage.binary import (
+    ARRAY_HEADER,
+    BOUNDED_RANGE,
+    EPOCH,
+    INT8,
+    MICROSECOND,
+    OPEN_RANGE,
+    UPPER_INFINITE,
+    UUID_ELEMENT,
+)
 
-# Where the columns of `recall_statements.columns` stand that are numbers of names.
-TYPE_ID, FRAME_ID, SUBJECT_FRAME_ID = 2, 4, 6
 
-_PG_EPOCH = datetime(2000, 1, 1, tzinfo=UTC)
-_INT64 = struct.Struct("!q")
-_BOUNDED = struct.Struct("!Biqiq")
-_OPEN = struct.Struct("!Biq")
-UPPER_INFINITE = 0x10
-"""The bit of a range's first byte that says it has no upper bound."""
-BOUNDED_BYTES = _BOUNDED.size
-"""How long a tstzrange with both bounds is in PostgreSQL's binary format."""
+class Column(IntEnum):
+    """Where each value of an event stands in a row of `recall_statements.columns`."""
+
+    ID = 0
+    UID = 1
+    TYPE_ID = 2
+    PERIOD = 3
+    FRAME_ID = 4
+    REGION = 5
+    SUBJECT_FRAME_ID = 6
+    SUBJECT = 7
+    FEATURES = 8
+    AGENT = 9
+    MEDIA_TYPE = 10
+    PAYLOAD = 11
+    PARTS = 12
+    WHOLES = 13
+    RECORDED_AT = 14
+
+
+# Plain numbers: with a member of the enumeration a row is indexed at half the speed.
+_ID, _UID, TYPE_ID, _PERIOD = Column.ID.value, Column.UID.value, Column.TYPE_ID.value, Column.PERIOD.value
+FRAME_ID, _REGION = Column.FRAME_ID.value, Column.REGION.value
+SUBJECT_FRAME_ID, _SUBJECT = Column.SUBJECT_FRAME_ID.value, Column.SUBJECT.value
+_FEATURES, _AGENT = Column.FEATURES.value, Column.AGENT.value
+_MEDIA_TYPE, PAYLOAD = Column.MEDIA_TYPE.value, Column.PAYLOAD.value
+_PARTS, _WHOLES, _RECORDED_AT = Column.PARTS.value, Column.WHOLES.value, Column.RECORDED_AT.value
 
 
 def moment(raw: bytes) -> datetime:
     """The instant of a timestamptz in PostgreSQL's binary format."""
-    return _PG_EPOCH + timedelta(microseconds=_INT64.unpack(raw)[0])
+    micros: int = INT8.unpack(raw)[0]
+    return EPOCH + MICROSECOND * micros
 
 
 def _interval(raw: bytes) -> Interval:
     if raw[0] & UPPER_INFINITE:
-        _, _, begin = _OPEN.unpack(raw)
-        return Interval(begin=_PG_EPOCH + timedelta(microseconds=begin), end=None)
-    _, _, begin, _, end = _BOUNDED.unpack(raw)
-    return Interval(begin=_PG_EPOCH + timedelta(microseconds=begin), end=_PG_EPOCH + timedelta(microseconds=end))
+        _, _, begin = OPEN_RANGE.unpack(raw)
+        return Interval(begin=EPOCH + MICROSECOND * begin, end=None)
+    _, _, begin, _, end = BOUNDED_RANGE.unpack(raw)
+    return Interval(begin=EPOCH + MICROSECOND * begin, end=EPOCH + MICROSECOND * end)
 
 
 def uids_of(raw: bytes) -> tuple[UUID, ...]:
-    """The elements of a uuid[] in PostgreSQL's binary format: a header of 20 bytes, then (length, 16 bytes) each."""
-    return tuple(UUID(bytes=raw[at : at + 16]) for at in range(24, len(raw), 20))
+    """The elements of a uuid[] in PostgreSQL's binary format."""
+    return tuple(UUID(bytes=uid) for _, uid in UUID_ELEMENT.iter_unpack(raw[ARRAY_HEADER.size :]))
 
 
 def _features(raw: bytes) -> tuple[Feature, ...]:
@@ -53,23 +81,23 @@ def _features(raw: bytes) -> tuple[Feature, ...]:
 def decoders(types: Mapping[int, str], frames: Mapping[int, str]) -> dict[str, Callable[[Sequence[Any]], Any]]:
     """For each field of a stored event, what reads it from a row of `recall_statements.columns`."""
 
-    def region(row: Sequence[Any], at: int) -> Region | None:
-        return None if row[at] is None else Region.from_wkb(row[at + 1], frame=frames[row[at]])
+    def region(row: Sequence[Any], frame_id: int, wkb: int) -> Region | None:
+        return None if row[frame_id] is None else Region.from_wkb(row[wkb], frame=frames[row[frame_id]])
 
     def payload(row: Sequence[Any]) -> Payload | None:
-        return None if row[11] is None else Payload(data=row[11], media_type=row[10])
+        return None if row[PAYLOAD] is None else Payload(data=row[PAYLOAD], media_type=row[_MEDIA_TYPE])
 
     return {
-        "id": lambda row: row[0],
-        "uid": lambda row: UUID(bytes=row[1]),
+        "id": lambda row: row[_ID],
+        "uid": lambda row: UUID(bytes=row[_UID]),
         "type": lambda row: types[row[TYPE_ID]],
-        "interval": lambda row: _interval(row[3]),
-        "region": lambda row: region(row, FRAME_ID),
-        "subject": lambda row: region(row, SUBJECT_FRAME_ID),
-        "features": lambda row: _features(row[8]),
-        "agent": lambda row: row[9],
+        "interval": lambda row: _interval(row[_PERIOD]),
+        "region": lambda row: region(row, FRAME_ID, _REGION),
+        "subject": lambda row: region(row, SUBJECT_FRAME_ID, _SUBJECT),
+        "features": lambda row: _features(row[_FEATURES]),
+        "agent": lambda row: row[_AGENT],
         "payload": payload,
-        "parts": lambda row: uids_of(row[12]),
-        "wholes": lambda row: uids_of(row[13]),
-        "recorded_at": lambda row: moment(row[14]),
+        "parts": lambda row: uids_of(row[_PARTS]),
+        "wholes": lambda row: uids_of(row[_WHOLES]),
+        "recorded_at": lambda row: moment(row[_RECORDED_AT]),
     }

@@ -1,30 +1,14 @@
-"""One memory is one schema: what it may be called, which revision it has, and whether this elm can work with it."""
+"""One memory is one schema: which revision it has, and whether this elm can work with it."""
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import psycopg
 
-from elm.errors import InvalidValue, MemoryMissing, SchemaMismatch
+from elm.errors import MemoryMissing, SchemaMismatch
 from elm.storage.connections import Connection
 from elm.storage.tables import REVISION
-
-_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_.-]{0,47}")
-_RESERVED = {"public", "information_schema", "topology", "tiger", "tiger_data"}
-EXTENSIONS = ("postgis", "btree_gist")
-
-
-def check_memory_name(name: str) -> str:
-    """`name`, when it can be a memory's and its schema's."""
-    if not isinstance(name, str) or not _NAME.fullmatch(name):
-        raise InvalidValue(
-            f"a memory's name is up to 48 letters, digits, '_', '-' and '.', a letter first, not {name!r}"
-        )
-    if name.lower() in _RESERVED or name.lower().startswith("pg_"):
-        raise InvalidValue(f"{name!r} is a name that PostgreSQL keeps for itself: choose another")
-    return name
 
 
 def revision_of(connection: Connection, memory: str) -> str | None:

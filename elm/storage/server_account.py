@@ -22,6 +22,7 @@ class ServerAccount:
 
     @classmethod
     def of_uid(cls, uid: int) -> ServerAccount:
+        """The account of this number; one without a name, as containers have them, is called by its number."""
         try:
             entry = pwd.getpwuid(uid)
         except KeyError:

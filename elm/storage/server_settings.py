@@ -13,6 +13,7 @@ _GIGABYTE = 1 << 30
 
 
 def default_settings(socket_directory: Path) -> dict[str, str]:
+    """The settings by name: no network, every commit on disk, buffers by the size of the machine."""
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     settings = {
         "listen_addresses": "",

@@ -2,37 +2,64 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 from uuid import UUID
 
-from elm.cues.algebra import UidCue
+from sqlalchemy import Select
+
+from elm.cues.algebra import Cue, UidCue
+from elm.errors import InvalidValue
 from elm.event import StoredEvent
-from elm.interval import Window
 from elm.query import Query
-from elm.storage import recall_statements, schema
+from elm.storage import forking, hints, recall_statements, schema
 from elm.storage.connections import Connection, Connections
-from elm.storage.cue_compiler import compile_cue
+from elm.storage.cue_compiler import CompiledCue, compile_cue
 from elm.storage.names import NameCache
 from elm.storage.rows import FRAME_ID, SUBJECT_FRAME_ID, TYPE_ID, decoders
+from elm.text import check_memory_name
+
+MOST_VALUES = 65_000
+"""Values that cues may have in one statement: of the 65,535 that PostgreSQL takes, a query has a few of its own."""
+
+
+def check_values(given: int) -> None:
+    """Refuse cues that have more values together than a statement can carry."""
+    if given > MOST_VALUES:
+        raise InvalidValue(
+            f"a cue of {given} values is too much for one statement, which takes {MOST_VALUES}: name many events by "
+            f"one cue of their uids, which counts as one value, or split the cue and recall by each part"
+        )
 
 
 class Session:
-    """One memory of one database, as one process works with it; safe to share between threads."""
+    """One memory of one database, as a process works with it; safe to share between threads, and with a fork."""
 
     def __init__(self, dsn: str, memory: str) -> None:
         self.dsn = dsn
-        self.memory = schema.check_memory_name(memory)
+        self.memory = check_memory_name(memory)
         self.connections = Connections(dsn, memory)
         self.names = NameCache(self.connections, memory)
         self.decode = decoders(self.names.types, self.names.frames)
         self.statements = recall_statements.StatementCache()
         self._is_ready = False
+        forking.renewed_in_children(self)
+
+    def begin_anew(self) -> None:
+        """Have statements that nobody else is building; names and numbers stay what they are."""
+        self.statements = recall_statements.StatementCache()
 
     def ready_to_recall(self) -> None:
         """Refuse a memory that is missing or of another schema."""
         if not self._is_ready:
             with self.connections.recalling() as connection:
+                schema.require(connection, self.memory)
+            self._is_ready = True
+
+    def ready_to_change(self) -> None:
+        """Refuse, over the connection that writes, a memory that is missing or of another schema."""
+        if not self._is_ready:
+            with self.connections.writing() as connection:
                 schema.require(connection, self.memory)
             self._is_ready = True
 
@@ -49,6 +76,21 @@ class Session:
             else:
                 schema.check_revision(revision, self.memory)
             self._is_ready = True
+
+    def compiled(self, cue: Cue, *, prefix: str = "p") -> CompiledCue:
+        """A cue as a condition in SQL, the names of whose values begin with `prefix`."""
+        self.ready_to_recall()
+        compiled = compile_cue(cue, self.names, prefix=prefix)
+        check_values(len(compiled.values))
+        return compiled
+
+    def asked(self, kind: str, query: Query, build: Callable[..., Select[Any]]) -> tuple[str, dict[str, Any]]:
+        """The statement of its `kind`, as `build` makes it, that answers a query, and its values."""
+        compiled = self.compiled(query.cue)
+        pinned, near = hints.of_query(query)
+        key = (kind, compiled.key, recall_statements.shape(query, pinned=pinned, near=near))
+        text = self.statements.text(key, lambda: build(compiled, query, pinned=pinned, near=near))
+        return text, {**compiled.values, **recall_statements.parameters(query, near=near)}
 
     def learn(self, rows: Sequence[Sequence[Any]], connection: Connection | None = None) -> None:
         """Have the names at hand that these rows of `recall_statements.columns` mention by number."""
@@ -81,13 +123,8 @@ class Session:
         """The events with these uids, as the given connection's transaction sees them."""
         if not uids:
             return
-        query = Query(cue=UidCue(uids=tuple(uids)))
-        compiled = compile_cue(query.cue, self.names)
-        text = self.statements.text(
-            ("find", compiled.key, recall_statements.shape(query, pinned=True, near=Window())),
-            lambda: recall_statements.find(compiled, query, pinned=True, near=Window()),
-        )
-        rows = connection.execute(text, compiled.values, binary=True).fetchall()
+        text, values = self.asked("find", Query(cue=UidCue(uids=tuple(uids))), recall_statements.find)
+        rows = connection.execute(text, values, binary=True).fetchall()
         self.learn(rows)
         for row in rows:
             yield StoredEvent.of_row(row, self.decode)

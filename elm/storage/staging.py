@@ -42,6 +42,12 @@ def stage(connection: Connection, rows: Iterable[tuple[int, int, encoding.Row]])
     _copy(connection, sql.COPY_STAGING, numbered)
 
 
+def clear(connection: Connection) -> None:
+    """Have nothing staged, though the transaction goes on."""
+    connection.execute(sql.CREATE_STAGING)
+    connection.execute("DELETE FROM staging")
+
+
 def lock_parts(connection: Connection, uids: Sequence[UUID]) -> bool:
     """Have nobody close or forget the events of these uids before the transaction ends; whether one is a tombstone."""
     connection.execute(sql.LOCK_PARTS, {"uids": uids})

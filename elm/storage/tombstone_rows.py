@@ -13,7 +13,7 @@ from elm.storage.batch_forgetting import admit_tombstones, admits_tombstones
 from elm.storage.connections import Connection
 from elm.storage.rows import moment
 from elm.storage.tables import HULL_OF_REGIONS, HULL_OF_SUBJECTS
-from elm.store import BatchReport, Refusal
+from elm.store import BatchReport, ForgettingCount, Refusal
 from elm.tombstone import RunTombstone, Tombstone, other_tombstone
 
 FrameName = Callable[[int], str]
@@ -46,9 +46,20 @@ def tombstones(connection: Connection, uids: Sequence[UUID] | None, frame: Frame
         )
 
 
-def run_tombstones(connection: Connection, frame: FrameName) -> Iterator[RunTombstone]:
-    """What is left of the rest of each forgetting."""
-    runs = connection.execute(sql.RUNS, binary=True).fetchall()
+def count(connection: Connection) -> ForgettingCount:
+    """How many runs of forgetting there were, and of how many events they tell."""
+    ((runs, events),) = connection.execute(sql.COUNT_RUNS).fetchall()
+    return ForgettingCount(runs=runs, events=events)
+
+
+def run_tombstones(
+    connection: Connection, frame: FrameName, names: Sequence[UUID] | None = None
+) -> Iterator[RunTombstone]:
+    """What is left of the rest of each forgetting, oldest first; with `names` of these runs, in any order."""
+    if names is None:
+        runs = connection.execute(sql.RUNS, binary=True).fetchall()
+    else:
+        runs = connection.execute(sql.RUNS_OF, {"runs": list(names)}, binary=True).fetchall()
     for start in range(0, len(runs), _AT_ONCE):
         some = runs[start : start + _AT_ONCE]
         hulls: dict[tuple[bytes, int], list[Region]] = {}
@@ -81,7 +92,8 @@ def keep(
         uids = [each.uid for each in singles]
         present = {UUID(bytes=uid) for (uid,) in connection.execute(sql.EVENTS_AMONG, {"uids": uids}, binary=True)}
         known: dict[UUID, Tombstone | RunTombstone] = {each.uid: each for each in tombstones(connection, uids, frame)}
-        known |= {each.run: each for each in run_tombstones(connection, frame)}
+        if runs := [each.run for each in given if isinstance(each, RunTombstone)]:
+            known |= {each.run: each for each in run_tombstones(connection, frame, runs)}
         new = existing = 0
         refused: list[Refusal] = []
         for index, each in enumerate(given):

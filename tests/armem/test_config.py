@@ -66,6 +66,7 @@ robot = "armar7"
 frame = "kitchen"
 radius = 0.1
 when = "on_eviction"
+at_stop = false
 backlog = 500
 wait = 2.0
 
@@ -155,6 +156,7 @@ def test_everything_there_can_be(directory: Path) -> None:
     assert known is not None
     assert (known.memory, known.dsn, known.robot, known.frame) == ("armar7", "memory://", "armar7", "kitchen")
     assert (known.settings.when, known.settings.backlog, known.settings.wait) == (When.ON_EVICTION, 500, 2.0)
+    assert not known.settings.at_stop
     instance = MemoryID(memory="Object", core_segment="Instance")
     assert [each for each in known.poses if each.segment == instance] == [
         PosePath.at("globalPose", segment=instance),
@@ -216,7 +218,7 @@ OF_A = '[[memories]]\nname = "A"\n[[memories.core_segments]]\nname = "B"\n'
     [
         ("", "", "there are no memories: add a table [[memories]]"),
         ("[[memories]\n", "", "this is no TOML in UTF-8"),
-        ("memories = 3\n", "memories", "expected array, got int"),
+        ("memories = 3\n", "memories", "is a list, not an integer: correct it"),
         ("[[memories]]\n", "memories number 1", "neither a name nor a profile"),
         ('[[memories]]\nname = "A"\n', 'memories "A"', "has no core segments"),
         ('[[memories]]\nname = "A\\u0000"\n', 'memories "A\0".name', "contains the character NUL"),
@@ -229,7 +231,7 @@ OF_A = '[[memories]]\nname = "A"\n[[memories.core_segments]]\nname = "B"\n'
         (AUDIO + "histroy = 3\n", 'memories "AudioMemory".histroy', "there is no such key: did you mean history?"),
         (AUDIO + "zzz = 3\n", 'memories "AudioMemory".zzz', "there is no such key: leave it out"),
         (AUDIO + "history = 0\n", 'memories "AudioMemory".history', "is 1 or more, or -1 for none"),
-        (AUDIO + 'history = "all"\n', 'memories "AudioMemory".history', "expected int | null, got str"),
+        (AUDIO + 'history = "all"\n', 'memories "AudioMemory".history', "is an integer, not a text: correct it"),
         (AUDIO + "delay_warning = -1\n", 'memories "AudioMemory".delay_warning', "a number of seconds from 0 on"),
         (AUDIO + "delay_warning = nan\n", 'memories "AudioMemory".delay_warning', "a number of seconds from 0 on"),
         (
@@ -239,15 +241,25 @@ OF_A = '[[memories]]\nname = "A"\n[[memories.core_segments]]\nname = "B"\n'
         ),
         (
             AUDIO + "[memories.history_limits]\nChunk = 0\n",
-            'memories "AudioMemory".history',
+            'memories "AudioMemory".history_limits "Chunk"',
             "Audio/Chunk is 1 or more",
         ),
         (
             AUDIO + '[memories.history_limits]\n"a//b" = 1\n',
-            'memories "AudioMemory".history_limits',
+            'memories "AudioMemory".history_limits "a//b"',
             "is empty: name it",
         ),
-        (AUDIO + '[memories.history_limits]\na = "b"\n', 'memories "AudioMemory".history_limits', "expected int"),
+        (AUDIO + '[memories.history_limits]\na = "b"\n', 'memories "AudioMemory".history_limits', "is an integer, not"),
+        (
+            AUDIO + "[memories.history_limits]\nNope = 3\n",
+            'memories "AudioMemory".history_limits "Nope"',
+            "there is no core segment 'Nope': add it, or correct this",
+        ),
+        (
+            OF_A + "history = 0\n",
+            'memories "A".core_segments "B".history',
+            "A/B is 1 or more, or -1 for none",
+        ),
         (
             AUDIO + "[[memories.core_segments]]\n",
             'memories "AudioMemory".core_segments number 1.name',
@@ -284,7 +296,25 @@ OF_A = '[[memories]]\nname = "A"\n[[memories.core_segments]]\nname = "B"\n'
         (OF_A + 'poses = ["a..b"]\n[long_term]\n', 'memories "A".core_segments "B".poses', "is no path into data"),
         (OF_A + 'poses = [{path = "a", unit = "ft"}]\n[long_term]\n', '"B".poses', "is one of mm, m, not 'ft'"),
         (AUDIO + "[long_term]\nbacklog = 0\n", "long_term", "backlog of consolidation is 1 or more"),
-        (AUDIO + '[long_term]\nwhen = "never"\n', "long_term.when", "invalid enum value 'never'"),
+        (AUDIO + '[long_term]\nwhen = "never"\n', "long_term.when", "is one of on_commit, on_eviction, not 'never'"),
+        (
+            AUDIO + '[long_term]\nwhen = "on_eviction"\n',
+            "long_term.when",
+            "nothing ever does, for no history has a limit",
+        ),
+        (AUDIO + 'history = -1\n[long_term]\nwhen = "on_eviction"\n', "long_term.when", "set history in [[memories]]"),
+        (AUDIO + "history = 1\n[long_term]\nat_stop = false\n", "long_term", "goes with when='on_eviction'"),
+        (
+            AUDIO + "[forgetting.offline]\ntime_decay = {minimum = 1, activation = 'linear'}\n",
+            "forgetting.offline.time_decay.activation",
+            "is one of exponential, ebbinghaus, not 'linear'",
+        ),
+        (
+            AUDIO + "[forgetting.online]\nretention = {count = 5}\n",
+            "forgetting.online.retention",
+            "there is no such key here: it is one of [forgetting.offline]",
+        ),
+        (AUDIO + "ice = 3\n", 'memories "AudioMemory".ice', "it is one of the top of the file"),
         (AUDIO + '[long_term]\nwhen = "on_eviction"\ndurable = true\n', "long_term", "only durable with"),
         (
             AUDIO + '[long_term.robot_state]\nsegment = "Audio"\npose = ""\n',
@@ -297,6 +327,20 @@ OF_A = '[[memories]]\nname = "A"\n[[memories.core_segments]]\nname = "B"\n'
             "no core segm",
         ),
         (AUDIO + '[long_term.robot_state]\nsegment = "a//b"\npose = ""\n', "long_term.robot_state.segment", "is empty"),
+        *(
+            (
+                f'{AUDIO}[long_term.robot_state]\nsegment = "Audio/Chunk"\npose = "a"\nfootprint = {footprint}\n',
+                "long_term.robot_state.footprint",
+                says,
+            )
+            for footprint, says in (
+                ("0.0", "must be greater than 0"),
+                ("[]", "three or more corners"),
+                ("[[0.0, 0.0], [1.0, 1.0]]", "three or more corners"),
+                ("[[0.0, 0.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0]]", "is not valid: Self-intersection"),
+                ("[[0.0, 0.0], [1.0, 1.0], [1.0, nan]]", "each a finite x and y"),
+            )
+        ),
         (AUDIO + "[forgetting.online]\nfrequency = {wait = 1}\n", "forgetting.online", 'set when = "on_eviction"'),
         (
             AUDIO + "[forgetting.offline]\nfrequency = {wait = -1}\n",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from datetime import UTC, datetime, timedelta, timezone
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -54,3 +55,9 @@ def test_what_is_no_time_is_refused(value: int | datetime, words: str) -> None:
 def test_what_no_datetime_says_is_refused(moment: int, words: str) -> None:
     with pytest.raises(InvalidMoment, match=words):
         to_datetime(moment)
+
+
+def test_integers_of_numpy_are_moments() -> None:
+    moment = as_moment(np.int64(5), what="the time")  # type: ignore[arg-type]
+
+    assert (moment, type(moment)) == (5, int)

@@ -34,7 +34,7 @@ class Program:
 
     @property
     def command(self) -> list[str]:
-        return [sys.executable, "-m", "elm.cli"]
+        return [sys.executable, "-m", "elm"]
 
     @property
     def environment(self) -> dict[str, str]:

@@ -58,6 +58,15 @@ def test_limited_recalls_go_on_where_they_ended(filled: Program) -> None:
     assert pages == whole
 
 
+def test_the_nearest_come_first_and_name_no_cursor(filled: Program) -> None:
+    done = filled.here("recall", "--type", "Drive", "--nearest", "7.3,0.5", "--limit", "3")
+    assert [json.loads(line)["uid"] for line in done.stdout.split("\n")[:-1]] == [uid(number) for number in (7, 6, 8)]
+    assert done.stderr == "first 3; --limit N for more\n"
+    table = filled.here("recall", "--is-a", "Motion", "--nearest", "7.5,0.5", "-o", "table", "--limit", "1")
+    # The one that has no place is none of the nearest.
+    assert table.stderr == f"first 1 of {DRIVES}; --limit N for more\n"
+
+
 def test_csv_holds_what_json_lines_hold(filled: Program) -> None:
     rows = list(csv.DictReader(io.StringIO(filled.here("recall", "-o", "csv").stdout, newline="")))
     events = lines(filled.here("recall").stdout)
@@ -100,6 +109,7 @@ def test_geojson_is_one_feature_collection(filled: Program) -> None:
         (("--type", "Drive", "--since", "2026-01-01T10:00:07Z", "--until", "2026-01-01T10:00:08Z"), 7),
         (("--type", "Drive", "--near", "-5,0.5,7"), 2),
         (("--type", "Drive", "--near", "-5,0.5,7,cellar"), 0),
+        (("--type", "Drive", "--near-subject", "-5,0.5,7"), 0),
         (("--feature", "number=7"), 1),
         (("--feature", 'number="7"'), 0),
         (("--feature", f"note={HOSTILE}", "--feature", "number=8"), 1),

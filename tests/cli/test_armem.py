@@ -101,8 +101,9 @@ def test_help_of_each_command(kitchen: Program, name: str) -> None:
         (("get", "Nothing"), 4),
         (("get", f"{CUP}/{END}/1"), 4),
         (("get", "Object", "--memory", "never-made"), 4),
-        (("forget", "--count", "9", "--dry-run", "Nothing"), 0),
-        (("forget", "--count", "9", "--dry-run", "--memory", "never-made"), 0),
+        (("forget", "--count", "9", "--dry-run", "Object"), 0),
+        (("forget", "--count", "9", "--dry-run", "Nothing"), 4),
+        (("forget", "--count", "9", "--dry-run", "--memory", "never-made"), 1),
         (("watch", "--memory", "never-made", "--timeout", "0"), 1),
         (("serve", "--config", "no-such.toml"), 1),
         (("ls", "--server", "no-such.toml"), 1),
@@ -175,6 +176,28 @@ def test_forgetting_takes_what_the_dry_run_said(program: Program) -> None:
     assert {row["id"] for row in left} & {row["id"] for row in told} == set()
     assert len(left) == 110
     assert lines(program.here("armem", "forget", "--count", "55", "--yes", "Object")) == []
+
+
+def test_a_configuration_forgets_in_its_own_memory(program: Program) -> None:
+    """Whatever memory the environment names: by these thresholds another robot's would be forgotten."""
+    own, dsn = program.settings["ELM_MEMORY"], program.settings["ELM_DSN"]
+    assert program.here("armem", "demo", "--memory", own).returncode == 0
+    text = '[[memories]]\nprofile = "ObjectMemory"\n[forgetting.offline]\nretention = {count = 55}\n'
+    (program.directory / "robot.toml").write_text(f'{text}[long_term]\nmemory = "{own}"\ndsn = "{dsn}"\n')
+    asked = ("armem", "forget", "--config", "robot.toml", "--dry-run")
+
+    elsewhere = program.having(ELM_MEMORY="another", ELM_DSN="postgresql://127.0.0.1:1/nowhere")
+    assert len(lines(elsewhere.here(*asked))) == 15
+    (program.directory / "robot.toml").write_text(f'{text}[long_term]\nmemory = "another"\n')
+    assert program.here(*asked).returncode == 1
+    assert len(lines(program.here(*asked, "--memory", own))) == 15
+    (program.directory / "robot.toml").write_text(text)
+    assert len(lines(program.here(*asked))) == 15
+
+
+def test_help_says_which_mechanisms_a_configuration_gives(program: Program) -> None:
+    said = " ".join(program.here("armem", "forget", "--help").stdout.replace("│", " ").split())
+    assert "Take the offline mechanisms of this configuration, and its memory" in said
 
 
 @pytest.mark.parametrize(("answer", "code", "left"), [("y", 0, 110), ("n", 1, 120)])
@@ -289,6 +312,10 @@ def test_memories_are_served_to_other_processes(program: Program) -> None:
             subprocess.run(command, cwd=program.directory, env=program.environment, check=True, timeout=60)
             printed, _ = watcher.communicate(timeout=60)
         assert [json.loads(line)["id"].rpartition("/")[0] for line in printed.splitlines()] == [MUG, MUG]
+
+        nobody = program("armem", "watch", "--server", "served.toml", "Nope", "--timeout", "0")
+        assert nobody.returncode == 1
+        assert "no memory server is registered as 'Nope' (there are: Object, RobotState)" in nobody.stderr
 
         asked = lines(program("armem", "ls", "--server", "served.toml", MUG))
         assert [row["referenced"] for row in asked] == [END - 2_000_000, END - 1_000_000, END]

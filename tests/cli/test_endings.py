@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -42,7 +43,15 @@ NOBODY_THERE = "postgresql://robot:geheim@127.0.0.1:1/elm"
         (("recall", "--cue", '{"op": "tipe"}'), 2),
         (("recall", "--cue", '{"op": '), 2),
         (("recall", "-o", "parquet"), 2),
+        (("recall", "--near-subject", "1,2"), 2),
+        (("recall", "--nearest", "1"), 2),
+        (("recall", "--nearest", "1,x"), 2),
+        (("recall", "--nearest", "1,2", "--order", "begin"), 2),
+        (("recall", "--nearest", "1,2", "--after", "1767261600000000.1"), 2),
+        (("recall", "--nearest", "1,2,unheard-of"), 4),
+        (("recall", "--nearest", "1,2"), 0),
         (("count", "--by", "colour"), 2),
+        (("count", "--by", "feature:"), 2),
         (("show", "cup"), 2),
         (("load", "no-such-file"), 2),
         (("types", "load"), 2),
@@ -58,6 +67,13 @@ def test_exit_codes(filled: Program, arguments: tuple[str, ...], code: int) -> N
     if code == 1:
         assert done.stderr.startswith("elm: ")
         assert len(done.stderr.splitlines()) == 1
+
+
+def test_a_choice_that_there_is_not_is_refused_in_words_of_the_command_line(program: Program) -> None:
+    done = program.here("recall", "--order", "end")
+    assert done.returncode == 2
+    told = " ".join(done.stderr.replace("│", " ").split())
+    assert "Invalid value for '--order': 'end' is not one of 'begin', '-begin'." in told
 
 
 def test_an_unreachable_database_is_code_3_and_keeps_its_password(filled: Program) -> None:
@@ -100,16 +116,60 @@ def test_control_c_ends_a_load_without_a_trace(program: Program) -> None:
     assert program.here("types", "add", "Drive").returncode == 0
     process = program.start("load", "-", stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     refused = program.directory / "stdin.refused.jsonl"
+    part = program.directory / "stdin.refused.jsonl.part"
     deadline = time.monotonic() + 60
     # The file for refused lines is made just before the first line is waited for.
-    while not refused.exists():
+    while not part.exists():
         assert time.monotonic() < deadline
         assert process.poll() is None
         time.sleep(0.02)
     process.send_signal(signal.SIGINT)
     answer, remarks = process.communicate(timeout=60)
-    assert (process.returncode, answer, remarks) == (130, b"", b"")
+    assert (process.returncode, answer) == (130, b"")
+    assert remarks.decode().splitlines() == [
+        "stopped: lines behind those that were read are not loaded",
+        "0 events loaded",
+    ]
     assert not refused.exists()
+    assert not part.exists()
+
+
+def test_control_c_keeps_what_a_slow_source_has_told(program: Program) -> None:
+    assert program.here("types", "add", "Drive").returncode == 0
+    process = program.start("load", "-", stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    assert process.stdin is not None
+    line = b'{"type": "Drive", "interval": ["2026-01-01T10:00:00Z", null]}\n'
+    process.stdin.write(line + line)
+    process.stdin.flush()
+    deadline = time.monotonic() + 60
+    # They are there while more may come.
+    while program.here("count").stdout != "2\n":
+        assert time.monotonic() < deadline
+        assert process.poll() is None
+        time.sleep(0.1)
+    process.stdin.write(line)
+    process.stdin.flush()
+    time.sleep(0.3)
+    process.send_signal(signal.SIGINT)
+    _, remarks = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert remarks.decode().splitlines()[-1] == "3 events loaded"
+    assert program.here("count").stdout == "3\n"
+
+
+def test_what_the_driver_says_of_a_connection_that_is_dropped_is_not_shown() -> None:
+    script = (
+        "import logging, sys\n"
+        "from elm.cli import main\n"
+        "sys.argv = ['elm', '--version']\n"
+        "try:\n"
+        "    main()\n"
+        "except SystemExit:\n"
+        "    logging.getLogger('psycopg').warning('error ignored in rollback')\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=True)
+    assert done.stdout.startswith("elm ")
+    assert done.stderr == ""
 
 
 def test_doctor_works_when_things_are_broken_and_keeps_secrets(program: Program, tmp_path: Path) -> None:

@@ -120,6 +120,17 @@ def test_an_exported_file_is_there_only_when_it_is_whole(filled: Program) -> Non
     assert Path("/dev/null").is_char_device()
 
 
+def test_a_file_that_cannot_be_written_is_named_as_the_user_named_it(filled: Program) -> None:
+    nowhere = filled.here("export", "--to", "nowhere/all.jsonl")
+    assert nowhere.returncode == 2
+    assert "--to" in nowhere.stderr
+    assert "nowhere: make it first" in " ".join(nowhere.stderr.replace("│", "").split())
+    assert not list(filled.directory.glob("**/*.part"))
+    full = filled.here("export", "--to", "/dev/full")
+    assert full.returncode == 1
+    assert "/dev/full: No space left on device" in full.stderr
+
+
 def test_geojson_exports_what_recall_writes(filled: Program) -> None:
     exported = json.loads(filled.here("export", "-o", "geojson").stdout)
     recalled = json.loads(filled.here("recall", "-o", "geojson").stdout)

@@ -233,6 +233,18 @@ def test_once_finds_what_is_there_and_nothing_twice(kitchen: Program) -> None:
     assert found(kitchen) == PAIRS
 
 
+def test_what_came_too_late_is_said(kitchen: Program) -> None:
+    run = ("recognize", "run", "--from", "kitchen.py", "--once")
+    assert kitchen.here(*run).returncode == 0
+    set_back = [event(6, "Look", 20), event(7, "Grasp", 25)]
+    assert kitchen.here("load", "-", stdin=told(set_back)).returncode == 0
+    done = kitchen.here(*run)
+    assert done.returncode == 0
+    warned, closing = done.stderr.splitlines()
+    assert warned.startswith("elm: recognition 'recognition': events come too late and are not fed: 2 to 'pairs'; ")
+    assert closing == "position 9 of 9, 2 complex events so far, too late: 2 for pairs"
+
+
 def test_how_it_is_doing_in_all_formats(kitchen: Program) -> None:
     nobody = kitchen.here("recognize", "status", "-o", "table")
     assert (nobody.returncode, nobody.stdout, nobody.stderr) == (0, "", "no recognizers have worked here\n")

@@ -307,6 +307,17 @@ def test_the_ends_of_time_and_space_are_kept(store: Store) -> None:
     assert [stored.uid for stored in store.find(Query(after=Cursor(begin=first, id=2**62)))] == [B]
 
 
+def test_what_lasted_for_ages_is_summed(store: Store) -> None:
+    """Thirty events from the year 1 on: together more microseconds than fit into 64 bits."""
+    store.add_types([EventType(name="Thing")])
+    ages = Interval(begin=datetime(1, 1, 1, tzinfo=UTC), end=datetime(9999, 12, 31, 23, 59, 59, 999_999, tzinfo=UTC))
+    store.commit_all([Arrival(event=Event(type="Thing", interval=ages)) for _ in range(30)])
+
+    (group,) = store.groups(cues.everything(), Grouping.TYPE)
+    assert ages.end is not None
+    assert group.duration == 30 * (ages.end - ages.begin)
+
+
 def _right_or_refused(ask: Callable[[], Any], right: Any) -> None:
     """The right answer or an error of elm's that is not the last resort."""
     try:

@@ -316,10 +316,15 @@ def test_unknown_uids_are_counted_and_nothing_is_nothing(store: LoggedStore) -> 
     assert len(list(store.run_tombstones())) == 1
 
 
-@pytest.mark.parametrize("what", ["everything", 7, [7], [str(P)], None])
+def test_a_uid_may_be_given_as_text(store: LoggedStore) -> None:
+    told(store, one(P))
+    assert numbers(forget(store, [str(P)])) == report(events=1)
+
+
+@pytest.mark.parametrize("what", ["everything", 7, [7], [str(P)[:-1]], None])
 def test_what_to_forget_is_a_cue_or_uids(store: LoggedStore, what: Any) -> None:
     told(store, one(P))
-    with pytest.raises(InvalidValue, match="uids"):
+    with pytest.raises(InvalidValue, match="uid"):
         forget(store, what)
     with pytest.raises(InvalidValue, match="batch"):
         forget(store, [P], batch=0)

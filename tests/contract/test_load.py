@@ -11,12 +11,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from elm import cues
-from elm.event import Event
+from elm.errors import ElmError
+from elm.event import Event, StoredEvent
 from elm.exchange import event_from_json, event_to_json, parse_json, to_line
 from elm.geometry import Region
+from elm.query import Query
+from elm.storage.memory import MemoryStore
 from elm.store import Arrival, Store
 from elm.taxonomy import EventType
-from elm.writer import Writer
+from elm.writer import LoadReport, Writer
 from tests.clock import at, span
 from tests.conftest import StoreFactory
 from tests.contract.telling import everything, few_memories, holds, numbered, story, tell
@@ -182,6 +185,101 @@ def test_whatever_is_broken_the_rest_is_kept(
     assert set(seen) == refused
     assert {event.uid for event in everything(store)} == {arrival.event.uid for arrival in kept}
     assert holds(store, numbered(told.types, kept, store))
+
+
+# Rows that repeat a uid
+
+
+def test_a_whole_that_came_too_early_is_kept_when_it_comes_again(typed: Store) -> None:
+    """A file that was appended to itself."""
+    report = typed.load(arrivals(whole(C, A, B), one(A), one(B), whole(C, A, B), one(A), whole(D, C)))
+
+    assert [refusal.index for refusal in report.refused] == [0]
+    assert (report.new, report.existing) == (4, 1)
+    assert [event.uid for event in everything(typed)] == [A, B, C, D]
+
+
+def test_a_row_that_is_corrected_further_down_is_kept(typed: Store) -> None:
+    report = typed.load(
+        arrivals(
+            one(A, type="Dance"), one(A), one(A, 2),
+            whole(C, A, interval=span(0, 2)), whole(D, C), whole(C, A, interval=span(0, 1)), whole(D, C), whole(C, A),
+        )
+    )  # fmt: skip
+
+    assert [refusal.index for refusal in report.refused] == [0, 2, 3, 4]
+    assert (report.new, report.existing) == (3, 1)
+    assert [event.uid for event in everything(typed)] == [A, C, D]
+
+
+def test_a_row_that_is_wrong_again_and_again_is_refused_each_time(typed: Store) -> None:
+    """Until it is there: what is given of a whole beyond its parts is no content of its own."""
+    wrong = [whole(C, A, interval=span(0, end)) for end in range(2, 60)]
+    report = typed.load(arrivals(one(A), *wrong, whole(C, A), *wrong))
+
+    assert (report.new, report.existing, len(report.refused)) == (2, len(wrong), len(wrong))
+    assert [event.uid for event in everything(typed)] == [A, C]
+
+
+GONE, OVER, CLOSED = UUID(int=20), UUID(int=21), UUID(int=22)
+"""A forgotten event, the whole that keeps its tombstone, and an event that was open when it was committed."""
+
+
+def lived(store: Store) -> Store:
+    """A memory that rows may meet in."""
+    store.add_types([EventType(name="Event")])
+    for event in (one(GONE), whole(OVER, GONE), one(CLOSED, None)):
+        store.commit(Arrival(event=event, recorded_at=at(9)))
+    store.close_event(CLOSED, at(3))
+    (gone,) = store.ids(Query(cue=cues.uid(GONE)))
+    assert store.forget([gone], run=UUID(int=30), at=at(9)).events == 1
+    return store
+
+
+UIDS = st.sampled_from([A, B, C, D, GONE, OVER, CLOSED])
+ROWS = st.one_of(
+    st.builds(one, UIDS, st.sampled_from([1, 3, None]), type=st.sampled_from(["Event", "Event", "Dance"])),
+    st.builds(
+        lambda uid, parts, given: whole(uid, *sorted(parts - {uid}), **given),
+        UIDS,
+        st.sets(UIDS, min_size=2, max_size=3),
+        st.sampled_from([{}, {}, {"interval": span(0, 1)}, {"interval": span(0, 3)}]),
+    ),
+)
+
+
+@few_memories
+@given(st.lists(ROWS, max_size=14), st.integers(2, 15))
+def test_what_becomes_of_a_row_depends_on_the_rows_before_it_alone(
+    store_factory: StoreFactory, rows: list[Event], batch: int
+) -> None:
+    """And not on where a batch begins: it is what would become of it if the rows were committed one by one."""
+    judge = lived(MemoryStore())
+    fates: list[bool | None] = []
+    for arrival in arrivals(*rows):
+        try:
+            fates.append(judge.commit(arrival).new)
+        except ElmError:
+            fates.append(None)
+
+    for size in (1, batch):
+        store = lived(store_factory())
+        report, refused = loaded(store, arrivals(*rows), size)
+        assert [index in refused for index in range(len(rows))] == [fate is None for fate in fates]
+        assert (report.new, report.existing) == (fates.count(True), fates.count(False))
+        assert same_but_ids(everything(store)) == same_but_ids(everything(judge))
+
+
+def loaded(store: Store, stream: list[Arrival], size: int) -> tuple[LoadReport, set[int]]:
+    """What a load in batches of a size reports, and the places in the stream of what it refuses."""
+    place = {id(arrival): index for index, arrival in enumerate(stream)}
+    refused: set[int] = set()
+    report = Writer(store).load(stream, batch=size, refused=lambda arrival, _: refused.add(place[id(arrival)]))
+    return report, refused
+
+
+def same_but_ids(events: list[StoredEvent]) -> list[Event]:
+    return [event.as_event() for event in events]
 
 
 @few_memories

@@ -27,7 +27,7 @@ from elm.errors import (
     UnknownType,
 )
 from elm.event import Event, StoredEvent
-from elm.log import Log, LogEntry, LogKind, Step, Tick
+from elm.log import Advance, Log, LogEntry, LogKind, Progress, Tick
 from elm.query import Query
 from elm.store import Arrival
 from elm.taxonomy import EventType
@@ -67,8 +67,8 @@ def arrivals(*events: Event) -> list[Arrival]:
     return [Arrival(event=event) for event in events]
 
 
-def step(name: str, before: int, position: int, **more: Any) -> Step:
-    return Step(name=name, before=before, position=position, **more)
+def advance(name: str, before: int, position: int, **more: Any) -> Advance:
+    return Advance(name=name, before=before, position=position, **more)
 
 
 Write = Callable[[Memory, Sequence[Event]], object]
@@ -220,23 +220,40 @@ def test_a_consumer_keeps_its_place(memory: Memory) -> None:
     assert [consumer.name for consumer in log.consumers()] == ["a", "ä"]
 
 
-def test_a_step_moves_position_report_and_with_a_state_the_checkpoint(memory: Memory) -> None:
+def test_an_advance_moves_position_report_and_with_a_state_the_checkpoint(memory: Memory) -> None:
     log = memory.log
     memory.commit_all([thing() for _ in range(5)])
     log.head()
     log.register("a")
-    log.advance([step("a", 0, 2, report={"late": 1, "by": ["x", None, 0.5]})])
+    log.advance([advance("a", 0, 2, report={"late": 1, "by": ["x", None, 0.5]})])
     first = log.consumer("a")
     assert first is not None
     assert (first.position, first.checkpoint, first.state) == (2, 0, None)
     assert first.report == {"late": 1, "by": ["x", None, 0.5]}
-    log.advance([step("a", 2, 4, state=b"\0\xff", report={"late": 2})])
-    log.advance([step("a", 4, 5), step("a", 5, 5, state=b"")])
+    log.advance([advance("a", 2, 4, state=b"\0\xff", report={"late": 2})])
+    log.advance([advance("a", 4, 5), advance("a", 5, 5, state=b"")])
     log.register("b", position=4)
-    log.advance([step("b", 4, 5, state=b"s"), step("a", 5, 5)])
+    log.advance([advance("b", 4, 5, state=b"s"), advance("a", 5, 5)])
     assert [(each.name, each.position, each.checkpoint, each.state, each.report) for each in log.consumers()] == [
         ("a", 5, 5, b"", {}),
         ("b", 5, 5, b"s", {}),
+    ]
+
+
+def test_progress_tells_all_of_consumers_but_what_they_know(memory: Memory) -> None:
+    log = memory.log
+    memory.commit_all([thing() for _ in range(5)])
+    log.head()
+    for name in ("b", "a"):
+        log.register(name)
+    log.advance([advance("b", 0, 4, state=b"s", report={"late": 2})])
+    assert log.progress() == [
+        Progress(name=each.name, position=each.position, report=each.report, updated_at=each.updated_at)
+        for each in log.consumers()
+    ]
+    assert [(each.name, each.position, each.report) for each in log.progress()] == [
+        ("a", 0, {}),
+        ("b", 4, {"late": 2}),
     ]
 
 
@@ -249,7 +266,7 @@ def test_results_are_kept_together_with_the_step(memory: Memory, count: int) -> 
     log.register("a", position=log.head())
     wholes = [thing(event) for event in seen]
     top = thing(*wholes)
-    done = log.advance([step("a", count, count)], arrivals(top, *wholes, seen[0], top))
+    done = log.advance([advance("a", count, count)], arrivals(top, *wholes, seen[0], top))
     assert [one.uid for one in done] == [event.uid for event in (top, *wholes, seen[0], top)]
     assert [one.new for one in done] == [True] * (count + 1) + [False, False]
     stored = memory.get(top.uid)
@@ -279,7 +296,9 @@ def test_a_refused_result_leaves_the_consumer_where_it_was(memory: Memory, reaso
     before = log.consumer("a")
     expected, events = _refused(memory, seen)[reason]
     with pytest.raises(expected):
-        log.advance([step("a", 0, 1, state=b"s", report={"x": 1})], arrivals(*[thing() for _ in range(more)], *events))
+        log.advance(
+            [advance("a", 0, 1, state=b"s", report={"x": 1})], arrivals(*[thing() for _ in range(more)], *events)
+        )
     assert log.consumer("a") == before
     assert told(log) == [(COMMIT, seen.uid)]
 
@@ -291,10 +310,12 @@ def test_who_lost_its_position_keeps_nothing(memory: Memory, count: int) -> None
     log.head()
     for name in ("a", "b", "c"):
         log.register(name)
-    log.advance([step("b", 0, 1)])
+    log.advance([advance("b", 0, 1)])
     before = log.consumers()
     with pytest.raises(PositionLost, match="'b' is at position 1, not at 0"):
-        log.advance([step("a", 0, 2), step("b", 0, 2), step("c", 0, 2)], arrivals(*[thing() for _ in range(count)]))
+        log.advance(
+            [advance("a", 0, 2), advance("b", 0, 2), advance("c", 0, 2)], arrivals(*[thing() for _ in range(count)])
+        )
     assert log.consumers() == before
     assert log.head() == 2
 
@@ -310,8 +331,8 @@ def test_positions_that_cannot_be(memory: Memory) -> None:
     with pytest.raises(InvalidValue, match="the log ends at 1"):
         log.rewind("a", 2)
     with pytest.raises(InvalidValue, match="the log ends at 1"):
-        log.advance([step("a", 1, 2)], arrivals(thing()))
-    for call in (lambda: log.rewind("b", 0), lambda: log.advance([step("b", 0, 0)], arrivals(thing()))):
+        log.advance([advance("a", 1, 2)], arrivals(thing()))
+    for call in (lambda: log.rewind("b", 0), lambda: log.advance([advance("b", 0, 0)], arrivals(thing()))):
         with pytest.raises(UnknownConsumer, match=r"no consumer 'b': register it"):
             call()
     for position in (-1, 2**63):
@@ -333,12 +354,12 @@ def test_rewind_begins_again_without_state(memory: Memory) -> None:
     memory.commit_all([thing() for _ in range(4)])
     log.head()
     log.register("a")
-    log.advance([step("a", 0, 4, state=b"s", report={"x": 1})])
+    log.advance([advance("a", 0, 4, state=b"s", report={"x": 1})])
     log.rewind("a", 1)
     found = log.consumer("a")
     assert found is not None
     assert (found.position, found.checkpoint, found.state) == (1, 1, None)
-    log.advance([step("a", 1, 3)])
+    log.advance([advance("a", 1, 3)])
     log.rewind("a", 4)
     assert [each.position for each in log.consumers()] == [4]
 
@@ -417,6 +438,7 @@ def test_a_closed_memory_has_no_log(memory: Memory) -> None:
         lambda: log.read(0, 1),
         lambda: log.write([Tick(agent=None, deadline=at(0))]),
         log.consumers,
+        log.progress,
         lambda: log.consumer("a"),
         lambda: log.register("a"),
         lambda: log.advance([]),
@@ -569,7 +591,7 @@ def test_a_named_subscription_that_another_moved_says_so(memory: Memory) -> None
     memory.commit_all([thing(), thing()])
     events = memory.subscribe(name="a", since=0, timeout=0)
     next(events)
-    memory.log.advance([step("a", 0, 1)])
+    memory.log.advance([advance("a", 0, 1)])
     with pytest.raises(PositionLost):
         list(events)
 

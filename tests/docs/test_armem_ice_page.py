@@ -8,9 +8,9 @@ from importlib import import_module
 import pytest
 
 from armem_bridge.aron.data import DEPTH_LIMIT
+from armem_bridge.config.values import PORT
 from armem_bridge.ice.communicators import MESSAGE_KILOBYTES, PROPERTIES
 from armem_bridge.ice.edge import NAME_SYSTEM, EdgeStatus, topic_of
-from armem_bridge.ice.standalone import PORT
 from armem_bridge.ice.wire.aron import ELEMENTS_LIMIT
 from tests.pages import Page
 

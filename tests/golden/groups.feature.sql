@@ -1,4 +1,4 @@
-SELECT json_typeof(v.value) AS json_typeof_1, v.value #>> '{}' AS anon_1, count(*) AS count_1, CAST(coalesce(sum(EXTRACT(epoch FROM upper(event.period) - lower(event.period)) * 1000000), 0) AS BIGINT) AS coalesce_1, min(lower(event.period)) AS min_1, max(upper(event.period)) AS max_1, bool_or(upper_inf(event.period)) AS bool_or_1
+SELECT json_typeof(v.value) AS json_typeof_1, v.value #>> '{}' AS anon_1, count(*) AS count_1, coalesce(sum(EXTRACT(epoch FROM upper(event.period) - lower(event.period)) * 1000000), 0) AS coalesce_1, min(lower(event.period)) AS min_1, max(upper(event.period)) AS max_1, bool_or(upper_inf(event.period)) AS bool_or_1
 FROM event LEFT OUTER JOIN LATERAL (SELECT anon_2.value -> 1 AS value
 FROM json_array_elements(event.features) AS anon_2(value)
 WHERE (anon_2.value ->> 0) = %(feature_name)s::VARCHAR) AS v ON true

@@ -165,4 +165,5 @@ def test_queues_do_not_keep_runs_that_have_ended() -> None:
     assert process.counts() == {"partial": 50, "dropped": 3950}
     assert sorted(each.event.uid.int for each in process.held()) == list(range(3950, 4000))
     assert process._oldest is not None
-    assert all(len(queue) <= 2 * 51 + SPARE for queue in (process._timers, process._silent, process._oldest))
+    queues = (process._deadlines.telling, process._deadlines.silent, process._oldest)
+    assert all(len(queue) <= 2 * 51 + SPARE for queue in queues)

@@ -19,8 +19,9 @@ from elm.event import Event, StoredEvent
 from elm.interval import Interval
 from elm.log import LoggedStore, LogKind, Tick
 from elm.query import Query
-from elm.recognition import RecognitionManager, Timing, replay
+from elm.recognition import RecognitionManager, Timing, latecomers, replay
 from elm.recognition.bench import SELF_FEEDING
+from elm.recognition.status import RecognizerStatus
 from elm.recognizers import Emission, Fed, Pattern, Recognizer, absent, step
 from elm.store import Arrival
 from elm.taxonomy import EventType
@@ -179,7 +180,7 @@ def test_a_failing_recognizer_is_tried_again_and_misses_nothing(memory: LoggedSt
     _until(lambda: any(each.failures >= 2 for each in manager.status()))
     assert manager.status()[0].error == "odd: OSError: the disk is full"
     healed = True
-    _until(lambda: len(found(memory, "Odd")) == 3)
+    _until(lambda: len(found(memory, "Odd")) == 3 and manager.status()[0].lag == 0)
     manager.stop()
     status = manager.status()[0]
     assert (status.is_failing, status.lag) == (False, 0)
@@ -246,6 +247,98 @@ def test_two_managers_of_one_consumer_exclude_each_other(memory: LoggedStore) ->
     RecognitionManager(memory, [PAIR], consumer="another").catch_up()
     first.stop()
     RecognitionManager(memory, [PAIR]).catch_up()
+
+
+def test_leaving_a_manager_looks_after_each_round_only(memory: LoggedStore) -> None:
+    looks: list[float] = []
+
+    class Watched(RecognitionManager):
+        def status(self) -> list[RecognizerStatus]:
+            looks.append(time.monotonic())
+            return super().status()
+
+    def slow(event: StoredEvent) -> Sequence[Emission]:
+        time.sleep(0.5)
+        return ()
+
+    tell(memory, "A")
+    with Watched(memory, [Odd(does=slow)]) as manager:
+        pass
+    assert [(each.lag, each.fed) for each in manager.status()] == [(0, 1)]
+    assert len(looks) <= 10
+
+
+def test_leaving_a_manager_does_not_wait_for_a_thread_that_broke(memory: LoggedStore) -> None:
+    def interrupted(event: StoredEvent) -> Sequence[Emission]:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt), RecognitionManager(memory, [Odd(does=interrupted)]):
+        tell(memory, "A")
+
+
+def test_starting_under_a_name_at_which_another_works_is_refused(
+    memory: LoggedStore, caplog: pytest.LogCaptureFixture
+) -> None:
+    tell(memory, "AB")
+    manager = RecognitionManager(memory, [PAIR])
+    with memory.log.exclusive("recognition"):
+        with pytest.raises(ConsumerBusy, match="'recognition'"):
+            manager.start()
+        with pytest.raises(ConsumerBusy), manager:
+            pass
+    assert caplog.records == []
+    manager.stop()
+    with manager:
+        pass
+    assert len(found(memory, "Pair")) == 1
+
+
+# Events that come too late
+
+
+def late_warnings(caplog: pytest.LogCaptureFixture) -> list[str]:
+    return [record.getMessage() for record in caplog.records if "too late" in record.getMessage()]
+
+
+def test_events_that_come_too_late_are_warned_of_once_in_a_while(
+    memory: LoggedStore, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Of all recognizers in one line, whose numbers add up though only some of the lines are written."""
+    other = replace(PAIR, name="other", type="Other")  # type: ignore[type-var]
+    manager = RecognitionManager(memory, [PAIR, other], batch=1)
+    tell(memory, "AB", begin=3600)
+    manager.catch_up()
+    assert late_warnings(caplog) == []
+    tell(memory, "ABAB")
+    manager.catch_up()
+    (said,) = late_warnings(caplog)
+    assert said.startswith("recognition 'recognition': events come too late and are not fed: 1 to 'other', 1 to 'pair'")
+    assert "of agent 'r'" in said
+    assert "3,600.2 s" in said
+    assert "lateness" in said
+    assert "replay" in said
+    assert [each.late for each in manager.status()] == [4, 4]
+
+
+def test_what_was_warned_of_is_not_warned_of_again(memory: LoggedStore, caplog: pytest.LogCaptureFixture) -> None:
+    """Neither when another process goes on, nor when a strand is fed again what it had been fed before."""
+    tell(memory, "AB", begin=3600)
+    tell(memory, "AB")
+    RecognitionManager(memory, [PAIR]).catch_up()
+    assert len(late_warnings(caplog)) == 1
+    tell(memory, "A", begin=7200)
+    RecognitionManager(memory, [PAIR]).catch_up()
+    assert len(late_warnings(caplog)) == 1
+
+
+def test_lines_about_late_events_are_some_time_apart(
+    memory: LoggedStore, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(latecomers, "TELL_EVERY", 0.0)
+    tell(memory, "AB", begin=3600)
+    tell(memory, "ABA")
+    RecognitionManager(memory, [PAIR], batch=1).catch_up()
+    assert ["not fed: 1 to 'pair'" in said for said in late_warnings(caplog)] == [True] * 3
 
 
 def test_a_changed_definition_needs_a_new_version(memory: LoggedStore) -> None:

@@ -222,6 +222,14 @@ def test_whatever_is_raised_stops_its_strand_alone(memory: Memory, error: BaseEx
 def test_only_recognizers_recognize(memory: Memory, given: Any) -> None:
     with pytest.raises(InvalidValue, match="recognizer"):
         RecognitionManager(memory.store, given)
+    with pytest.raises(InvalidValue, match="recognizer"):
+        replay(memory.store, given)
+
+
+@pytest.mark.parametrize("given", [[], [1]])
+def test_only_recognizers_look_at_the_log_once(memory: Memory, given: Any) -> None:
+    with pytest.raises(InvalidValue, match="recognizer"):
+        memory.recognize(given)
 
 
 def test_a_rewound_consumer_begins_anew_while_it_is_at_work(memory: Memory) -> None:

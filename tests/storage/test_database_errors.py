@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import signal
 import tempfile
-from collections.abc import Callable, Iterator
+import time
+from collections.abc import Callable, Generator, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from itertools import count
 from pathlib import Path
 from threading import Event as Signal
 from threading import Thread
 from typing import LiteralString
-from uuid import uuid4
+from uuid import UUID, uuid4
 
 import psycopg
 import pytest
@@ -27,13 +30,14 @@ from elm.errors import (
     DatabaseUnfit,
     DatabaseUnreachable,
     ElmError,
+    InvalidValue,
     MemoryMissing,
     SchemaMismatch,
     StoreFailure,
     UnknownEvent,
 )
 from elm.event import Event
-from elm.query import Grouping, Query
+from elm.query import Grouping, Join, JoinRelation, Query
 from elm.storage import diagnose, migrate
 from elm.storage.cluster import Cluster
 from elm.storage.postgres import PostgresStore
@@ -123,6 +127,42 @@ def test_no_such_database_or_user(postgres_server: Server) -> None:
             store.count(cues.everything())
 
 
+def test_a_server_that_answers_is_not_told_to_be_away(cluster: Cluster) -> None:
+    cluster.up()
+    rules = cluster.home / "data" / "pg_hba.conf"
+    rules.write_text(f"local all guarded scram-sha-256\nlocal all shut_out reject\n{rules.read_text()}")
+    with psycopg.connect(cluster.dsn(), autocommit=True) as connection:
+        connection.execute("CREATE ROLE guarded LOGIN PASSWORD 'right'")
+        connection.execute("CREATE ROLE shut_out LOGIN")
+        connection.execute("SELECT pg_reload_conf()")
+    guarded = {word: {"user": "guarded", "password": word} for word in ("right", "wrong")}
+    remedies = {
+        make_conninfo(cluster.dsn("nowhere")): r'database "nowhere" does not exist.*createdb',
+        make_conninfo(cluster.dsn(), user="nobody"): r'role "nobody" does not exist.*[Cc]orrect the user',
+        make_conninfo(cluster.dsn(), user="shut_out"): r"[Cc]orrect the user.*pg_hba\.conf",
+        make_conninfo(cluster.dsn(), user="guarded", passfile=os.devnull): r"asks for a password.*PGPASSWORD",
+        make_conninfo(cluster.dsn(), **guarded["wrong"]): r"password authentication failed.*password",
+        make_conninfo(cluster.dsn("nowhere"), **guarded["right"]): "createdb",
+    }
+    for address, remedy in remedies.items():
+        with opened(address) as store, pytest.raises(DatabaseUnreachable, match=rf"the server of .*{remedy}") as error:
+            store.count(cues.everything())
+        assert not re.search("[Ss]tart the server|no database at", str(error.value))
+
+
+def test_a_cue_of_more_values_than_a_statement_takes_is_refused(dsn: str) -> None:
+    with opened(dsn) as store:
+        begin(store)
+        wide = cues.any_of(*(cues.agent(str(number)) for number in range(65_001)))
+        half = cues.any_of(*(cues.agent(str(number)) for number in range(32_501)))
+        with pytest.raises(InvalidValue, match=r"65001 values.*65000.*uids.*split"):
+            store.count(wide)
+        with pytest.raises(InvalidValue, match=r"65002 values"):
+            next(store.join(Join(anchors=Query(cue=half), cue=half, relation=JoinRelation.BEFORE)))
+        many = [UUID(int=number) for number in range(100_000)]
+        assert store.count(cues.uid(*many)) == 0
+
+
 @pytest.mark.parametrize(
     "address",
     ["nonsense", "host=", "postgresql://[::1", "postgresql://a b", "colour=red", "port=many", "mysql://here/there"],
@@ -176,6 +216,23 @@ def test_memory_that_does_not_exist_is_named(dsn: str) -> None:
                 ask()
         begin(store)
         assert store.count(cues.everything()) == 1
+
+
+def test_memory_that_does_not_exist_is_not_made_by_changing_it(dsn: str) -> None:
+    with opened(dsn, "kitchem") as store:
+        for change in (
+            lambda: store.close_event(uuid4(), at(1)),
+            lambda: store.log.rewind("reader", 0),
+            lambda: store.log.remove("reader"),
+        ):
+            with pytest.raises(MemoryMissing, match=r"'kitchem'.*elm migrate"):
+                change()
+        store.finish_load()
+        with psycopg.connect(dsn, autocommit=True) as connection:
+            assert connection.execute("SELECT FROM pg_namespace WHERE nspname = 'kitchem'").rowcount == 0
+        begin(store)
+        with pytest.raises(UnknownEvent):
+            store.close_event(uuid4(), at(1))
 
 
 # Without rights
@@ -484,6 +541,40 @@ def test_server_that_is_started_again(cluster: Cluster, end: Callable[[Cluster],
         assert len(said) <= 1
         assert all("Try again" in message for message in said)
         assert store.count(cues.everything()) == 4 - len(said)
+
+
+@pytest.mark.parametrize("name", [None, "reader"])
+@pytest.mark.parametrize("end", [_stop, _kill])
+def test_subscription_outlives_its_server(cluster: Cluster, end: Callable[[Cluster], None], name: str | None) -> None:
+    cluster.up()
+    with elm.connect(cluster.dsn(), f"subscribed_{end.__name__[1:]}_{name or 'unnamed'}") as memory:
+        memory.add_type("Thing")
+        seen: list[int] = []
+        subscription = memory.subscribe(since=0, name=name, timeout=60)
+
+        def committed() -> int:
+            return memory.commit(Event(type="Thing", interval=span(0, 1))).id
+
+        first = committed()
+        seen.append(next(subscription).id)
+        end(cluster)
+        waiting = ThreadPoolExecutor(1)
+        following = waiting.submit(lambda: [next(subscription).id for _ in range(2)])
+        time.sleep(0.5)
+        assert not following.done()
+        cluster.up()
+        with suppress(DatabaseUnreachable):
+            # The first call hears of the connection that was lost.
+            memory.recall().count()
+        later = [committed(), committed()]
+        seen += following.result(timeout=60)
+        waiting.shutdown()
+        assert seen == [first, *later]
+        assert isinstance(subscription, Generator)
+        subscription.close()
+        if name is not None:
+            # What was not handed over with its whole page comes again.
+            assert [event.id for event in memory.subscribe(name=name, timeout=0)] in (later, later[1:])
 
 
 def test_server_that_dies_while_results_are_read(cluster: Cluster) -> None:

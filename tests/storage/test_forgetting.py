@@ -6,6 +6,7 @@ import runpy
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
+from dataclasses import replace
 from functools import partial
 from typing import Any
 from uuid import UUID, uuid4
@@ -18,14 +19,16 @@ from elm import cues
 from elm.errors import DatabaseUnfit, ForgottenEvent, StoreFailure, UnknownEvent
 from elm.event import Event
 from elm.forgetting import forget
+from elm.geometry import Region
 from elm.query import Query
-from elm.storage import forgetting_statements, migrate
+from elm.storage import batch_forgetting, forgetting_statements, migrate, tombstone_rows
 from elm.storage import write_statements as statements
+from elm.storage.connections import WRITING, open_connection
 from elm.storage.postgres import PostgresStore
 from elm.storage.tables import REVISION
 from elm.store import Arrival, Closed, Store
 from elm.taxonomy import EventType
-from elm.tombstone import Tombstone
+from elm.tombstone import RunTombstone, Tombstone
 from tests.clock import at, span
 from tests.servers import MEMORY
 from tests.storage.test_concurrency import WAYS, WRITERS, Robots, arrivals, at_once, going_on, whole
@@ -400,6 +403,24 @@ def test_forgetting_and_writing_wholes_race(
         check_whole(robots)
 
 
+def test_an_event_that_is_forgotten_amid_a_load_of_another_of_its_uid(
+    robots: Robots, threads: ThreadPoolExecutor, dsn: str
+) -> None:
+    """The load has seen the event, waits to read it, and finds it gone: it begins anew."""
+    event = ended()
+    (kept,) = robots.store.commit_all(arrivals(event))
+    other = Event(type="Thing", interval=span(5, 6), uid=event.uid)
+    with psycopg.connect(dsn, options=f"-c search_path={MEMORY},public") as connection:
+        connection.execute("LOCK TABLE part IN ACCESS EXCLUSIVE MODE")
+        loading = threads.submit(robots.store.load, arrivals(other))
+        robots.wait_for_locks(loading)
+        batch_forgetting.forget(connection, [kept.id], uuid4(), at(9), lambda *_: {1: "Thing"})
+    report = loading.result()
+    assert (report.new, report.existing, report.refused) == (1, 0, ())
+    (found,) = robots.store.find(Query())
+    assert found.interval == other.interval
+
+
 # Stopped
 
 
@@ -437,6 +458,39 @@ def test_a_forgetting_that_was_stopped_goes_on_when_it_is_repeated(robots: Robot
     assert (again.events, again.unknown) == (5, 4)
     assert tombstones(robots.store) == {part.uid for part in parts[:4]}
     assert [run.events for run in robots.store.run_tombstones()] == [4, 1]
+
+
+# What keeping tombstones costs
+
+
+def test_keeping_tombstones_reads_no_runs_but_theirs(robots: Robots, dsn: str) -> None:
+    frames = ["hall", "yard"]
+    there = [Event(type="Thing", interval=span(0, 1), region=Region.box(0, 0, 1, 1, frame=name)) for name in frames]
+    robots.store.commit_all(arrivals(*there))
+    for event in there:
+        forget(robots.store, [event.uid])
+    first, second = robots.store.run_tombstones()
+    single = Tombstone(uid=uuid4(), interval=span(0, 1), run=second.run)
+    with open_connection(dsn, WRITING, memory=MEMORY) as connection:
+        numbers: dict[str, int] = dict(connection.execute("SELECT name, id FROM frame").fetchall())
+        asked: list[int] = []
+
+        def frame(number: int) -> str:
+            asked.append(number)
+            return robots.store._session.frame_name(number)
+
+        cases: list[tuple[list[Tombstone | RunTombstone], list[int]]] = [
+            ([single], []),
+            ([first, single], [numbers["hall"]]),
+            ([second], [numbers["yard"]]),
+        ]
+        for given, looked_up in cases:
+            asked.clear()
+            tombstone_rows.keep(connection, given, frame, numbers.__getitem__)
+            assert asked == looked_up
+        other = replace(second, events=7)
+        report = tombstone_rows.keep(connection, [first, other, second], frame, numbers.__getitem__)
+    assert (report.new, report.existing, [refusal.index for refusal in report.refused]) == (0, 2, [1])
 
 
 # What it costs where nothing was forgotten

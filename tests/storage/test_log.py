@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
+from datetime import timedelta
 from pathlib import Path
 from statistics import median
 from threading import Barrier
@@ -18,12 +19,16 @@ from uuid import uuid4
 import psycopg
 import pytest
 from psycopg import sql
+from psycopg.conninfo import make_conninfo
 
+from elm import cues
 from elm.app import Memory
-from elm.errors import ConsumerBusy, DatabaseUnreachable, PositionLost
+from elm.errors import ConsumerBusy, DatabaseUnfit, DatabaseUnreachable, MemoryMissing, PositionLost, StoreFailure
 from elm.event import Event
-from elm.log import LogEntry, LogKind, Step
+from elm.log import Advance, LogEntry, LogKind
 from elm.query import Query
+from elm.recognition import RecognitionManager
+from elm.recognizers import Session
 from elm.storage import postgres_log
 from elm.storage.encoding import COLUMNS
 from elm.storage.postgres import PostgresStore
@@ -226,8 +231,33 @@ def test_many_bring_the_log_up_to_date_while_many_write(another: Open, store: Po
 # Consumers
 
 
+def test_progress_is_told_without_reading_what_consumers_know(
+    store: PostgresStore, session: Callable[[], psycopg.Connection[Any]]
+) -> None:
+    recognizer = Session(name="s", version=1, type="Found", cue=cues.is_a("Thing"), gap=timedelta(seconds=1))
+    commit(store, thing())
+    manager = RecognitionManager(store, [recognizer])
+    manager.catch_up()
+    with session() as connection:
+        connection.execute("ALTER TABLE consumer RENAME COLUMN state TO hidden")
+    with pytest.raises(StoreFailure, match='"state" does not exist'):
+        store.log.consumers()
+    ((progress,), (status,)) = store.log.progress(), manager.status()
+    assert (progress.position, status.position, status.fed) == (1, 1, 0)
+
+
+@pytest.mark.parametrize("call", ["rewind", "remove"])
+def test_what_changes_consumers_creates_no_memory(
+    another: Open, session: Callable[[], psycopg.Connection[Any]], call: str
+) -> None:
+    log = another(memory="misspelt").log
+    with pytest.raises(MemoryMissing, match="misspelt"):
+        log.rewind("a", 0) if call == "rewind" else log.remove("a")
+    assert session().execute("SELECT to_regnamespace('misspelt')").fetchone() == (None,)
+
+
 def test_of_several_processes_one_goes_on(another: Open, store: PostgresStore) -> None:
-    """Each commits its results with its step: all but one find their position lost, and their results nowhere."""
+    """Each commits its results with its advance: all but one find their position lost, and their results nowhere."""
     commit(store, *[thing() for _ in range(30)])
     store.log.head()
     store.log.register("a")
@@ -241,7 +271,7 @@ def test_of_several_processes_one_goes_on(another: Open, store: PostgresStore) -
             barrier.wait(timeout=60)
             try:
                 results = [Arrival(event=thing()), Arrival(event=thing())]
-                mine.log.advance([Step(name="a", before=position, position=position + 1)], results)
+                mine.log.advance([Advance(name="a", before=position, position=position + 1)], results)
                 won += 1
             except PositionLost:
                 pass
@@ -285,7 +315,7 @@ def test_a_lost_connection_lets_go_of_the_name(
 
 @pytest.mark.parametrize("count", [2, 20])
 @pytest.mark.parametrize("is_heard", [True, False], ids=["answer-lost", "words-lost"])
-def test_a_step_happens_whole_or_not_at_all(
+def test_an_advance_happens_whole_or_not_at_all(
     dsn: str, another: Open, store: PostgresStore, count: int, is_heard: bool
 ) -> None:
     """The connection breaks before (or right after) each message of the call in turn, until it does not break."""
@@ -297,7 +327,7 @@ def test_a_step_happens_whole_or_not_at_all(
         store.log.register(name)
         parts = [thing() for _ in range(count - 1)]
         results = [*parts, thing(*parts)]
-        step = Step(name=name, before=0, position=1, state=b"s", report={"n": number})
+        advance = Advance(name=name, before=0, position=1, state=b"s", report={"n": number})
         before = store.statistics().events
         with Cutter(dsn) as cutter:
             mine = another(cutter.dsn)
@@ -305,7 +335,7 @@ def test_a_step_happens_whole_or_not_at_all(
             before += 1
             cutter.cut(number, is_heard=is_heard)
             try:
-                mine.log.advance([step], [Arrival(event=event) for event in results])
+                mine.log.advance([advance], [Arrival(event=event) for event in results])
                 is_cut = False
             except DatabaseUnreachable:
                 is_cut = True
@@ -323,7 +353,7 @@ def test_a_step_happens_whole_or_not_at_all(
     assert outcomes[-1] == (False, True)
     assert outcomes[0] == (True, False)
     assert len(outcomes) > 10
-    # Once all that matters was said, the step holds though nobody heard of it.
+    # Once all that matters was said, the advance holds though nobody heard of it.
     assert [kept for _, kept in outcomes] == sorted(kept for _, kept in outcomes)
 
 
@@ -419,6 +449,67 @@ def test_who_no_longer_waits_does_not_listen(
         assert connection.execute("SELECT pg_listening_channels()").fetchall() == []
 
 
+# Without rights
+
+
+@pytest.fixture
+def grant(dsn: str, session: Callable[[], psycopg.Connection[Any]]) -> Iterator[Callable[..., str]]:
+    """Gives a role rights to all tables of the memory; its address."""
+    owner, role = session(), f"log_visitor_{uuid4().hex[:8]}"
+    owner.autocommit = True
+    owner.execute(f"CREATE ROLE {role} LOGIN; GRANT USAGE ON SCHEMA {MEMORY} TO {role}".encode())
+
+    def give(rights: str, *tables: str) -> str:
+        on = ", ".join(tables) or f"ALL TABLES IN SCHEMA {MEMORY}"
+        owner.execute(f"GRANT {rights} ON {on} TO {role}".encode())
+        return make_conninfo(dsn, user=role)
+
+    yield give
+    owner.execute(f"DROP OWNED BY {role}; DROP ROLE {role}".encode())
+
+
+@pytest.mark.parametrize("kind", ["without rights", "in a transaction that only reads"])
+def test_who_may_only_read_reads_what_has_entered_the_log(
+    another: Open, store: PostgresStore, grant: Callable[..., str], dsn: str, kind: str
+) -> None:
+    reading = make_conninfo(dsn, options="-c default_transaction_read_only=on")
+    reader = another(grant("SELECT") if kind == "without rights" else reading)
+    commit(store, thing(), thing())
+    assert reader.log.head() == 0
+    assert not reader.log.wait(0, 0.1)
+    assert store.log.head() == 2
+    store.log.register("a", position=1)
+    commit(store, thing())
+    assert reader.log.head() == 2
+    assert reader.log.wait(1, 0)
+    assert reader.log.read(0, 9) == store.log.read(0, 9)
+    assert [each.position for each in reader.log.progress()] == [1]
+    with ThreadPoolExecutor(1) as threads:
+        waiting = threads.submit(reader.log.wait, 2, 60)
+        time.sleep(0.05)
+        assert not waiting.done()
+        store.log.head()
+        assert waiting.result(timeout=10)
+    assert len(entries(reader)) == 3
+    for write in (lambda: reader.log.register("b"), lambda: reader.log.remove("a")):
+        with pytest.raises(DatabaseUnfit):
+            write()
+    assert reader.log.wait(2, 0)
+
+
+@pytest.mark.parametrize("some", [("INSERT", "log_inbox"), ("UPDATE", "log_head"), ("INSERT", "consumer")])
+def test_who_may_write_some_of_the_log_hears_what_is_missing(
+    another: Open, store: PostgresStore, grant: Callable[..., str], some: tuple[str, str]
+) -> None:
+    """And does not wait for others, who perhaps never come, to do what is its own to do."""
+    rights, table = some
+    grant("SELECT")
+    writer = another(grant(rights, f"{MEMORY}.{table}"))
+    commit(store, thing())
+    with pytest.raises(DatabaseUnfit, match=rf"lacks rights.*'{MEMORY}'"):
+        writer.log.head()
+
+
 # A restore
 
 
@@ -443,7 +534,9 @@ def test_a_restored_memory_has_the_same_log(
     store.log.head()
     store.close_event(open_part.uid, at(5))
     store.log.register("a")
-    store.log.advance([Step(name="a", before=0, position=2, state=b"\0s", report={"x": 1})], [Arrival(event=thing())])
+    store.log.advance(
+        [Advance(name="a", before=0, position=2, state=b"\0s", report={"x": 1})], [Arrival(event=thing())]
+    )
     store.log.define({"fall/1": "abc"})
     dump = tmp_path / "memory.dump"
     subprocess.run(["pg_dump", "--format=custom", f"--file={dump}", dsn], check=True)

@@ -31,6 +31,7 @@ from elm.event import Event
 from elm.log import LogKind
 from elm.query import Query
 from elm.storage import migrate
+from elm.storage.memory import MemoryStore
 from elm.storage.postgres import PostgresStore
 from elm.storage.tables import REVISION, metadata
 from elm.store import Arrival
@@ -459,11 +460,28 @@ def test_the_same_event_in_two_memories(stores: Callable[[str], PostgresStore]) 
 
 
 @pytest.mark.parametrize(
-    "name", ["", "1st", "_x", "a b", "a;b", 'a"b', "a'b", "ärger", "a" * 49, "public", "Public", "pg_x", "PG_catalog"]
+    "name",
+    [
+        "",
+        "1st",
+        "_x",
+        "a b",
+        "a;b",
+        'a"b',
+        "a'b",
+        "ärger",
+        "a" * 49,
+        "public",
+        "Public",
+        "pg_x",
+        "PG_catalog",
+        "../x",
+        5,
+    ],
 )
-def test_names_that_are_refused(dsn: str, name: str) -> None:
+def test_names_that_are_refused(dsn: str, name: Any) -> None:
     before = schemas(dsn)
-    for call in (partial(PostgresStore, dsn, name), partial(migrate, dsn, name)):
+    for call in (partial(PostgresStore, dsn, name), partial(migrate, dsn, name), partial(MemoryStore, name)):
         with pytest.raises(InvalidValue, match="name"):
             call()
     assert schemas(dsn) == before

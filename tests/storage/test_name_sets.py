@@ -72,6 +72,6 @@ def test_up_to_eight_names_their_subsets_are_looked_for(dsn: str, number: int, b
     store = PostgresStore(dsn, MEMORY)
     store.add_types([])
     cue = cues.feature_names("subset", [f"name-{index}" for index in range(number)])
-    text, _ = store._asked("ids", Query(cue=cue), recall_statements.find_ids)
+    text, _ = store._session.asked("ids", Query(cue=cue), recall_statements.find_ids)
     assert ("hash_array" in text) is by_sets
     store.close()

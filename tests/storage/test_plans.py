@@ -149,11 +149,11 @@ def _run(store: PostgresStore, text: str, values: Mapping[str, Any]) -> Cost:
 
 def cost(store: PostgresStore, query: Query) -> Cost:
     """What a recall costs; the names and pages that it needs have been read before."""
-    return _run(store, *store._asked("find", query, recall_statements.find))
+    return _run(store, *store._session.asked("find", query, recall_statements.find))
 
 
 def _text_of(store: PostgresStore, build: Callable[..., Any], cue: Cue) -> tuple[str, dict[str, Any]]:
-    compiled = store._compiled(cue)
+    compiled = store._session.compiled(cue)
     return str(build(compiled).compile(dialect=recall_statements.DIALECT)), compiled.values
 
 
@@ -413,7 +413,7 @@ def test_of_a_type_below_many_a_stretch_of_time_is_enough(life: Life, order: Ord
 
 def _ran(store: PostgresStore, query: Query) -> set[str]:
     """The steps of a limited recall that found something."""
-    text, values = store._asked("find", query, recall_statements.find)
+    text, values = store._session.asked("find", query, recall_statements.find)
     with store._connections.recalling() as connection:
         row = connection.execute(f"EXPLAIN (ANALYZE, FORMAT JSON) {text}", values, binary=False).fetchone()
     assert row is not None
@@ -443,7 +443,7 @@ CORRELATED: Mapping[str, Ask] = {
 
 def _naive(life: Life, cue: Cue, order: Order, limit: int) -> Cost:
     """The cost of the statement that one would write first: all conditions, then ORDER BY and LIMIT."""
-    text, values = life.store._asked("find", Query(cue=cue, order=order), recall_statements.find)
+    text, values = life.store._session.asked("find", Query(cue=cue, order=order), recall_statements.find)
     return _run(life.store, f"{text} LIMIT %(limit)s", {**values, "limit": limit})
 
 

@@ -96,7 +96,7 @@ def test_installed_program_migrates(python: Path, dsn: str, tmp_path: Path) -> N
     assert Path(where).is_relative_to(python.parents[1])
     program = python.with_name("elm")
     said = run(program, "migrate", "--dsn", dsn, "--memory", "kitchen", cwd=tmp_path)
-    again = run(python, "-m", "elm.cli", "migrate", "--dsn", dsn, "--memory", "kitchen", cwd=tmp_path)
+    again = run(python, "-m", "elm", "migrate", "--dsn", dsn, "--memory", "kitchen", cwd=tmp_path)
     assert (said.strip(), again.strip()) == (
         f"created memory 'kitchen' (schema {REVISION})",
         f"memory 'kitchen' is up to date (schema {REVISION})",

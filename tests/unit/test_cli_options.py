@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import timedelta
 from typing import Annotated, Any
 from uuid import UUID
@@ -12,13 +12,14 @@ import typer
 from typer.testing import CliRunner
 
 from elm import cues, errors
-from elm.cli.cue_options import CueOptions
+from elm.cli.cue_options import CueOptions, nearest_to
 from elm.cli.event_table import contents, feature, lasting
 from elm.cli.exits import ExitCode, exit_code, message
 from elm.cli.naming import event_name
 from elm.cli.option_groups import takes_groups
 from elm.cli.terminal import visible
 from elm.cues.algebra import And, RegionCue
+from elm.cues.relations import Place
 from elm.errors import ElmError
 from elm.event import Payload
 from elm.geometry import Region
@@ -70,6 +71,27 @@ def test_near_reaches_to_its_metres(near: str, inside: Region, outside: Region) 
         assert (distance <= found.distance) is expected
 
 
+def test_near_is_asked_of_the_subject_alike() -> None:
+    (here,) = CueOptions(near="1,2,3,cellar").read().args  # type: ignore[attr-defined]
+    (there,) = CueOptions(near_subject="1,2,3,cellar").read().args  # type: ignore[attr-defined]
+    assert replace(there, place=here.place) == here
+    assert (here.place, there.place) == (Place.REGION, Place.SUBJECT)
+
+
+@pytest.mark.parametrize(("given", "frame"), [("3,-2", "map"), ("3,-2,floor 2, east", "floor 2, east")])
+def test_the_nearest_are_those_to_a_point_of_a_frame(given: str, frame: str) -> None:
+    found = nearest_to(given)
+    assert found.place is Place.REGION
+    assert found.to.frame == frame
+    assert found.to.distance(Region.around(3, -2, 0.01, frame=frame)) == 0
+
+
+@pytest.mark.parametrize("given", ["", "3", "3,", "x,2", "nan,2", "3,2,"])
+def test_what_names_no_point_is_wrong_usage(given: str) -> None:
+    with pytest.raises(typer.BadParameter):
+        nearest_to(given)
+
+
 def test_near_names_a_frame_with_any_characters() -> None:
     (found,) = CueOptions(near="1,2,3,floor 2, east").read().args  # type: ignore[attr-defined]
     assert found.region.frame == "floor 2, east"
@@ -79,6 +101,7 @@ def test_near_names_a_frame_with_any_characters() -> None:
     "options",
     [
         CueOptions(near="1,2"),
+        CueOptions(near_subject="1,2"),
         CueOptions(near="1,2,x"),
         CueOptions(near="1,2,-3"),
         CueOptions(near="inf,2,3"),

@@ -8,7 +8,9 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner, Result
 
+from elm.app import connect
 from elm.cli.program import app
+from elm.errors import InvalidValue
 
 
 @pytest.fixture(autouse=True)
@@ -44,6 +46,15 @@ def elm(*arguments: str, stdin: str | None = None) -> Result:
 def test_an_empty_memory(arguments: tuple[str, ...], code: int, printed: str) -> None:
     done = elm(*arguments)
     assert (done.exit_code, done.stdout) == (code, printed), done.output
+
+
+def test_an_empty_dsn_is_a_mistake_and_not_the_private_cluster(tmp_path: Path) -> None:
+    done = CliRunner().invoke(app, ["types", "add", "Drive", "--dsn", ""], prog_name="elm")
+    assert done.exit_code == 1
+    assert "empty DSN" in done.stderr
+    with pytest.raises(InvalidValue, match="empty DSN"):
+        connect("")
+    assert not (tmp_path / "home").exists()
 
 
 def test_statistics_of_nothing() -> None:

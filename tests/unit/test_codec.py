@@ -55,7 +55,7 @@ EXAMPLES: list[tuple[Cue, dict[str, Any]]] = [
     ),
     (cues.time("subset"), {"op": "time", "relation": "subset", "interval": [None, None]}),
     (cues.time("subset", at(0)), {"op": "time", "relation": "subset", "interval": [BOUNDS[0], None]}),
-    (cues.recorded("before", None, at(4)), {"op": "recorded_at", "relation": "before", "interval": [None, BOUNDS[1]]}),
+    (cues.recorded("subset", None, at(4)), {"op": "recorded_at", "relation": "subset", "interval": [None, BOUNDS[1]]}),
     (cues.time("equal", span(0, None)), {"op": "time", "relation": "equal", "interval": [BOUNDS[0], None]}),
     *(
         (build(relation, BOX), {"op": op, "relation": relation.value, "frame": "map", "polygon": BOX_JSON})

@@ -10,6 +10,7 @@ from uuid import UUID
 
 import pytest
 
+from elm import chunks
 from elm.columns import batches_of, reader_of, schema, without_extensions
 from elm.errors import MissingPackage
 from elm.event import Event, Payload
@@ -117,6 +118,18 @@ def test_batches_are_made_as_they_are_asked_for(store: MemoryStore) -> None:
     assert next(batches).num_rows == 1
     assert next(batches, None) is None
     assert reader_of(batches_of(events())).read_next_batch().num_rows == 3
+
+
+def test_large_payloads_fill_a_batch(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("pyarrow")
+    monkeypatch.setattr(chunks, "CHUNK_BYTES", 1_000)
+    store = MemoryStore()
+    store.add_types([EventType(name="See")])
+    seen = [Event(type="See", interval=Interval.since(BEGIN), payload=Payload(data=bytes(600))) for _ in range(5)]
+    store.commit_all([Arrival(event=event) for event in seen])
+    batches = list(store.arrow(Query()))
+    assert [batch.num_rows for batch in batches] == [2, 2, 1]
+    assert [value for batch in batches for value in batch.column("payload").to_pylist()] == [bytes(600)] * 5
 
 
 def test_other_libraries_read_the_stream(store: MemoryStore) -> None:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import FrozenInstanceError, replace
 from datetime import UTC
 from typing import Any
-from uuid import UUID
+from uuid import RFC_4122, UUID
 
 import pytest
 from hypothesis import given
@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from shapely.geometry import Polygon
 
 from elm.errors import CycleRefused, InvalidValue
-from elm.event import Event, PartialEvent, Payload, StoredEvent, content_hash
+from elm.event import Event, PartialEvent, Payload, StoredEvent, content_hash, hashed_uid
 from elm.features import Feature
 from tests.clock import at, span
 from tests.contents import HERE, ONE, OTHER_CONTENT, SAME_CONTENT, THERE, THREE, TWO, grasp
@@ -29,6 +29,20 @@ def test_type_and_interval_are_enough() -> None:
 
     assert (event.region, event.subject, event.agent, event.payload) == (None, None, None, None)
     assert (event.features, event.parts, event.is_complex) == ((), (), False)
+
+
+def test_uids_may_be_given_as_text() -> None:
+    event = Event(type="Serve", uid=str(ONE), parts=[str(TWO), THREE])
+
+    assert (event.uid, event.parts) == (ONE, (TWO, THREE))
+    assert PartialEvent(type="Grasp", interval=span(0, 1), uid=str(ONE)).uid == ONE  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("place", ["region", "subject"])
+def test_a_bare_polygon_for_a_place_is_refused_with_what_to_make_of_it(place: str) -> None:
+    polygon: Any = Polygon([(0, 0), (1, 0), (1, 1)])
+    with pytest.raises(InvalidValue, match=rf"the {place} of an event is an elm\.Region\(polygon="):
+        Event(type="Grasp", interval=span(0, 1), **{place: polygon})
 
 
 def test_each_event_gets_a_uid_of_its_own() -> None:
@@ -71,7 +85,7 @@ def test_parts_are_enough_instead_of_an_interval() -> None:
         ({"payload": b"bytes"}, "the payload of an event"),
         ({"uid": "0197"}, "the uid of an event"),
         ({"uid": None}, "the uid of an event"),
-        ({"parts": [str(TWO)]}, "the parts of an event"),
+        ({"parts": ["not a uid"]}, "the parts of an event"),
         ({"parts": str(TWO)}, "the parts of an event"),
         ({"parts": TWO}, "the parts of an event"),
         ({"parts": None}, "the parts of an event"),
@@ -152,6 +166,12 @@ def test_events_with_values_of_other_kinds_are_not_equal() -> None:
 @pytest.mark.parametrize("why", SAME_CONTENT)
 def test_the_same_content_has_the_same_hash(why: str) -> None:
     assert content_hash(SAME_CONTENT[why]()) == content_hash(grasp())
+
+
+def test_a_hashed_uid_is_the_same_for_ever() -> None:
+    assert str(hashed_uid(b"")) == "e3b0c442-98fc-8c14-9afb-f4c8996fb924"
+    assert str(hashed_uid(b"elm")) == "af9b6fe9-bdaa-854b-97a1-6b90780a1c2d"
+    assert {(each.version, each.variant) for each in map(hashed_uid, (b"", b"elm"))} == {(8, RFC_4122)}
 
 
 def test_the_uid_is_no_content() -> None:

@@ -266,3 +266,20 @@ def test_a_line_holds_no_line_break_whatever_the_text() -> None:
 
 def test_a_region_is_written_with_its_frame() -> None:
     assert region_to_json(Region.from_geojson(POLYGON, frame="odom")) == {"frame": "odom", "polygon": POLYGON}
+
+
+@pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        ("null", "an event is a JSON object, not null"),
+        ("true", "an event is a JSON object, not true"),
+        ('{"type": null}', "'type' of an event must be text, not null"),
+        ('{"type": "A", "parts": [null]}', "'parts' of an event is not a UUID: null"),
+        ('{"type": "A", "interval": {"begin": false}}', """pair [BEGIN, END], not {"begin":false}"""),
+        ('{"type": "A", "uid": ["' + "x" * 200 + '"]}', "'uid' of an event is not a UUID: [\"" + "x" * 78),
+    ],
+)
+def test_what_stands_on_a_line_is_told_as_it_stands_there(line: str, told: str) -> None:
+    with pytest.raises(InvalidValue) as refused:
+        event_from_json(parse_json(line, what="the line"))
+    assert str(refused.value).endswith(told)

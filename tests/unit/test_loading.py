@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Callable
+import os
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from threading import Event, Thread
+from time import monotonic, sleep
+from typing import IO
 from uuid import UUID
 
 import pytest
 
-from elm.app import Memory
-from elm.errors import CycleRefused, InvalidValue, StoreClosed
+from elm.app import Memory, connect
+from elm.errors import CycleRefused, DatabaseUnreachable, InvalidValue, StoreClosed
+from elm.lines import Waiting
 from elm.loading import FileReport, RefusedLine, load_lines, load_stream, read_types
 from elm.storage.memory import MemoryStore
 from elm.taxonomy import EventType
@@ -121,6 +126,54 @@ def test_the_refused_file_holds_the_lines_as_they_stood(memory: Memory, refused_
     assert refused_file.read_bytes() == b'{"type" : 1}\r\n\xff\n'
 
 
+def test_a_load_that_fails_leaves_the_refused_lines_of_an_earlier_one(memory: Memory, refused_file: Path) -> None:
+    """For lines that came by a pipe they are the only copy."""
+    refused_file.write_bytes(b"left by an earlier load\n")
+    memory.close()
+    with pytest.raises(StoreClosed):
+        load_stream(memory.writer, io.BytesIO(drive(1)), refused_file=refused_file, refused=lambda line: None)
+    assert refused_file.read_bytes() == b"left by an earlier load\n"
+    assert list(refused_file.parent.iterdir()) == [refused_file]
+
+
+def test_a_load_from_an_unreachable_server_leaves_them_too(refused_file: Path) -> None:
+    refused_file.write_bytes(b"left by an earlier load\n")
+    with connect("host=127.0.0.1 port=1 dbname=elm") as memory, pytest.raises(DatabaseUnreachable):
+        load_stream(memory.writer, io.BytesIO(drive(1)), refused_file=refused_file, refused=lambda line: None)
+    assert refused_file.read_bytes() == b"left by an earlier load\n"
+
+
+def test_a_load_that_fails_later_keeps_the_lines_it_refused_until_then(memory: Memory, refused_file: Path) -> None:
+    refused_file.write_bytes(b"left by an earlier load\n")
+
+    def broken(_: int) -> None:
+        raise OSError("the terminal is gone")
+
+    stream = io.BytesIO(b"no JSON\n" + b"".join(map(drive, range(1, LOAD_BATCH + 2))))
+    with pytest.raises(OSError, match="the terminal is gone"):
+        load_stream(memory.writer, stream, refused_file=refused_file, refused=lambda line: None, progress=broken)
+    assert refused_file.read_bytes() == b"no JSON\n"
+    assert list(refused_file.parent.iterdir()) == [refused_file]
+
+
+def test_the_refused_lines_of_an_earlier_load_stay_until_the_next_one_is_done(
+    memory: Memory, refused_file: Path
+) -> None:
+    """Even that file itself can be loaded."""
+    refused_file.write_bytes(b"no JSON\n" + drive(1))
+    with refused_file.open("rb") as stream:
+        report = load_stream(memory.writer, stream, refused_file=refused_file, refused=lambda line: None)
+    assert (report.new, report.refused) == (1, 1)
+    assert refused_file.read_bytes() == b"no JSON\n"
+
+
+def test_the_refused_file_may_be_a_link(memory: Memory, refused_file: Path, tmp_path: Path) -> None:
+    link = tmp_path / "link"
+    link.symlink_to(refused_file)
+    load_stream(memory.writer, io.BytesIO(b"no JSON"), refused_file=link, refused=lambda line: None)
+    assert (link.is_symlink(), refused_file.read_bytes()) == (True, b"no JSON\n")
+
+
 @pytest.mark.parametrize("lines", [b"", drive(1)])
 def test_the_refused_file_is_gone_when_nothing_was_refused(memory: Memory, refused_file: Path, lines: bytes) -> None:
     refused_file.write_text("left by an earlier load\n")
@@ -141,6 +194,12 @@ def test_an_unwritable_refused_file_stops_the_load_before_it_begins(memory: Memo
         load_stream(
             memory.writer, io.BytesIO(drive(1)), refused_file=tmp_path / "nowhere" / "x", refused=lambda line: None
         )
+    assert memory.recall().count() == 0
+
+
+def test_a_folder_for_refused_lines_stops_the_load_before_it_begins(memory: Memory, tmp_path: Path) -> None:
+    with pytest.raises(IsADirectoryError):
+        load_stream(memory.writer, io.BytesIO(drive(1)), refused_file=tmp_path, refused=lambda line: None)
     assert memory.recall().count() == 0
 
 
@@ -175,3 +234,84 @@ def test_what_is_refused_can_be_loaded_again_once_it_is_mended(memory: Memory, r
     with refused_file.open("rb") as stream:
         report = load_stream(memory.writer, stream, refused_file=refused_file.with_suffix(".again"), refused=keep)
     assert report.new == 1
+
+
+def told_by_a_pipe(memory: Memory, tmp_path: Path, tell: Callable[[IO[bytes]], None], stop: Event) -> FileReport:
+    """The load of what `tell` writes into a pipe, meanwhile."""
+    read, write = os.pipe()
+    with os.fdopen(read, "rb") as stream, os.fdopen(write, "wb", buffering=0) as source:
+        teller = Thread(target=tell, args=(source,))
+        teller.start()
+        try:
+            return load_stream(
+                memory.writer,
+                stream,
+                refused_file=tmp_path / "refused.jsonl",
+                refused=lambda line: None,
+                stopped=stop.is_set,
+            )
+        finally:
+            teller.join()
+
+
+def soon(memory: Memory, count: int) -> bool:
+    deadline = monotonic() + 60
+    while memory.recall().count() != count and monotonic() < deadline:
+        sleep(0.02)
+    return memory.recall().count() == count
+
+
+def test_a_source_that_makes_us_wait_finds_its_lines_kept_meanwhile(memory: Memory, tmp_path: Path) -> None:
+    kept: list[bool] = []
+
+    def tell(source: IO[bytes]) -> None:
+        # The last line has not ended yet.
+        source.write(drive(1) + b"no JSON\n" + drive(2) + drive(3)[:9])
+        kept.append(soon(memory, 2))
+        source.write(drive(3)[9:])
+        kept.append(soon(memory, 3))
+        source.write(b"no JSON\n" + drive(4).rstrip())
+        source.close()
+
+    report = told_by_a_pipe(memory, tmp_path, tell, Event())
+    assert kept == [True, True]
+    assert (report.read, report.new, report.refused) == (6, 4, 2)
+
+
+def test_a_stop_keeps_what_was_read_and_does_not_wait_for_the_source(memory: Memory, tmp_path: Path) -> None:
+    stop = Event()
+
+    def tell(source: IO[bytes]) -> None:
+        source.write(drive(1) + drive(2) + drive(3)[:9])
+        assert soon(memory, 2)
+        stop.set()
+
+    report = told_by_a_pipe(memory, tmp_path, tell, stop)
+    assert (report.read, report.new, report.refused) == (2, 2, 0)
+
+
+def test_a_stop_ends_a_file_between_two_lines(memory: Memory, tmp_path: Path) -> None:
+    file, asked = tmp_path / "events.jsonl", iter([False, False, True])
+    file.write_bytes(drive(1) + drive(2) + drive(3))
+    with file.open("rb") as stream:
+        report = load_stream(
+            memory.writer,
+            stream,
+            refused_file=tmp_path / "refused.jsonl",
+            refused=lambda line: None,
+            stopped=lambda: next(asked),
+        )
+    assert (report.read, report.new) == (2, 2)
+
+
+def test_a_source_that_makes_us_wait_hears_of_refused_lines_alone(memory: Memory) -> None:
+    told: list[int] = []
+
+    def lines() -> Iterator[bytes | Waiting]:
+        yield b"no JSON"
+        yield Waiting()
+        assert told == [1]
+        yield b"no JSON"
+
+    load_lines(memory.writer, lines(), refused=lambda line: told.append(line.number))
+    assert told == [1, 2]

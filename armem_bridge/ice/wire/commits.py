@@ -12,11 +12,16 @@ from armem_bridge.ice.wire.aron import AronWire
 from armem_bridge.ice.wire.identifiers import IdentifierWire, not_set
 from armem_bridge.memory_id import MemoryID
 from armem_bridge.moments import NOT_SET
+from armem_bridge.working.admission import why_malformed
 from armem_bridge.working.commit import Commit, CommitResult, EntityUpdate, UpdateResult
 from armem_bridge.working.segments import AddSegment, SegmentResult
 
 TIMES: Final = {Generation.THIRD: ("timeCreated", "timeSent"), Generation.FOURTH: ("referencedTime", "sentTime")}
 """What the generations call the referenced and the sent time of an update."""
+
+
+GREATEST_FLOAT: Final = (2 - 2**-23) * 2.0**127
+"""The greatest number of 32 bits, which confidences have on the wire."""
 
 
 class CommitWire:
@@ -56,20 +61,30 @@ class CommitWire:
             confidence=wire.confidence,
         )
 
-    def write_commit(self, commit: Commit) -> Any:
-        """The commit as the slice files have it."""
+    def why_unsendable(self, update: EntityUpdate) -> str:
+        """Why an update cannot be sent, to whatever memory, and what to do about it; empty when it can."""
+        why = why_malformed(update)
+        if not why and abs(update.confidence) > GREATEST_FLOAT:
+            return (
+                f"the confidence of the update of {update.entity} is sent in 32 bits, which {update.confidence:g} "
+                f"does not fit into: give one of 0 to 1"
+            )
+        return why
+
+    def write_commit(self, commit: Commit, *, sent: int = NOT_SET) -> Any:
+        """The commit as the slice files have it; updates that do not say when they were sent are sent at `sent`."""
         made = self._new_commit()
-        made.updates = [self._write_update(update) for update in commit.updates]
+        made.updates = [self._write_update(update, sent) for update in commit.updates]
         return made
 
-    def _write_update(self, update: EntityUpdate) -> Any:
+    def _write_update(self, update: EntityUpdate, sent: int) -> Any:
         ids, write = self._ids, self._aron.write
         made = self._new_update()
         made.entityID = ids.write_id(update.entity)
         made.instancesData = [write(data) for data in update.instances]
         made.confidence = update.confidence
         setattr(made, self._referenced, ids.write_time(update.referenced))
-        setattr(made, self._sent, ids.write_time(update.sent))
+        setattr(made, self._sent, ids.write_time(update.sent if update.sent >= 0 else sent))
         return made
 
     def write_result(self, results: Iterable[UpdateResult]) -> Any:
@@ -121,13 +136,25 @@ class CommitWire:
             clear_when_exists=wire.clearWhenExists,
         )
 
+    def why_no_wish(self, wish: AddSegment) -> str:
+        """Why a wish for a segment cannot be sent, and what to do about it; empty when it can."""
+        what = f"the provider segment {wish.provider_segment!r:.80} of {wish.core_segment!r:.80}"
+        if not isinstance(wish.core_segment, str) or not isinstance(wish.provider_segment, str):
+            return f"{what} cannot have this name: the names of segments are text"
+        if wish.aron_type is not None:
+            return (
+                f"{what} cannot get its type from here, for types of segments do not travel: leave it out, "
+                f"or give the core segment the type where the memory server is defined"
+            )
+        return ""
+
     def write_segments(self, wishes: Iterable[AddSegment]) -> list[Any]:
         """Wishes for segments as the slice files have them."""
         return [
             self._segment(
                 coreSegmentName=wish.core_segment,
                 providerSegmentName=wish.provider_segment,
-                clearWhenExists=wish.clear_when_exists,
+                clearWhenExists=bool(wish.clear_when_exists),
             )
             for wish in wishes
         ]

@@ -9,9 +9,9 @@ from typing import Any
 from sqlalchemy import ColumnElement
 
 from elm.cues.relations import Comparison
-from elm.storage.conditions.rule import Bind, Condition
+from elm.storage.conditions.rule import Bind, SqlCondition
 
-COMPARE: Mapping[Comparison, Callable[[ColumnElement[Any], Bind], Condition]] = MappingProxyType(
+COMPARE: Mapping[Comparison, Callable[[ColumnElement[Any], Bind], SqlCondition]] = MappingProxyType(
     {
         Comparison.EQ: lambda stored, p: stored == p,
         Comparison.NE: lambda stored, p: stored != p,

@@ -24,7 +24,7 @@ from sqlalchemy import (
 
 from elm.cues.algebra import KinCue
 from elm.cues.relations import Kin, SetRelation
-from elm.storage.conditions.rule import UIDS, Bind, Condition, Rule
+from elm.storage.conditions.rule import UIDS, Bind, Rule, SqlCondition
 from elm.storage.tables import event, part, tombstone
 
 
@@ -36,7 +36,7 @@ def kin(cue: KinCue) -> Rule:
     key = (cue.kin.value, cue.relation.value, cue.transitive, bool(cue.uids))
     lines = _Lines(cue.kin, transitive=cue.transitive)
 
-    def build(e: FromClause, p: Bind) -> Condition:
+    def build(e: FromClause, p: Bind) -> SqlCondition:
         given = _ids(cue.kin, lambda e: e.c.uid == any_(p))
         match cue.relation:
             case SetRelation.INTERSECTS:
@@ -54,14 +54,14 @@ def kin(cue: KinCue) -> Rule:
             case unknown:
                 assert_never(unknown)
 
-    return Rule(key, (uids,), build)
+    return Rule(key=key, values=(uids,), build=build)
 
 
 def _own_parts(cue: KinCue) -> Rule:
     """The direct parts stand in the event's row; the links of one of the given find the few rows to look at."""
     values = ((list(cue.uids), UIDS), (cue.uids[0] if cue.uids else None, Uuid()))
 
-    def build(e: FromClause, p: Bind, one: Bind) -> Condition:
+    def build(e: FromClause, p: Bind, one: Bind) -> SqlCondition:
         within = e.c.parts.op("<@", is_comparison=True)(p)
         if cue.relation is SetRelation.SUBSET:
             return within
@@ -72,14 +72,14 @@ def _own_parts(cue: KinCue) -> Rule:
         covers = and_(e.c.id == any_(func.array(wholes.scalar_subquery())), e.c.parts.op("@>", is_comparison=True)(p))
         return and_(covers, within) if cue.relation is SetRelation.EQUAL else covers
 
-    return Rule((cue.kin.value, cue.relation.value, "own", bool(cue.uids)), values, build)
+    return Rule(key=(cue.kin.value, cue.relation.value, "own", bool(cue.uids)), values=values, build=build)
 
 
 _BY_ROW = (SetRelation.EQUAL, SetRelation.SUPERSET, SetRelation.SUBSET)
 _other = event.alias("other")
 
 
-def _ids(kin: Kin, are_meant: Callable[[FromClause], Condition]) -> Any:
+def _ids(kin: Kin, are_meant: Callable[[FromClause], SqlCondition]) -> Any:
     """The ids of some events; as parts also those of tombstones, which are wholes of nothing.
 
     What says that there are none is a constant to the planner: it costs nothing until there is the first.
@@ -105,7 +105,7 @@ class _Lines:
         """The ids of the events that have one of the `given` among their kin."""
         return select(self._reached(given).c.own_id)
 
-    def has_all(self, e: FromClause, uids: Bind, given: Any) -> Condition:
+    def has_all(self, e: FromClause, uids: Bind, given: Any) -> SqlCondition:
         """Whether every one of `uids` is among the event's kin; one that does not exist never is."""
         reached = self._reached(given)
         every = (
@@ -115,11 +115,11 @@ class _Lines:
         )
         return e.c.id.in_(every)
 
-    def has_any(self, e: FromClause) -> Condition:
+    def has_any(self, e: FromClause) -> SqlCondition:
         """Whether the event has any kin."""
         return exists(select(literal_column("1")).where(self._own == e.c.id).correlate(e))
 
-    def has_other_than(self, e: FromClause, uids: Bind, given: Any) -> Condition:
+    def has_other_than(self, e: FromClause, uids: Bind, given: Any) -> SqlCondition:
         """Whether the event has kin that is not among `uids`, whose ids are `given`."""
         if not self._transitive:
             # Only of wholes: an event's direct parts are judged by its own row.

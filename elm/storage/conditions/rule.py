@@ -9,7 +9,7 @@ from typing import Any, Protocol
 from sqlalchemy import ARRAY, TIMESTAMP, ColumnElement, Text, Uuid
 from sqlalchemy.types import TypeEngine
 
-Condition = Any  # a ColumnElement of bool; SQLAlchemy types what operators return as Any
+SqlCondition = Any  # a ColumnElement of bool; SQLAlchemy types what operators return as Any
 Bind = ColumnElement[Any]
 
 
@@ -23,7 +23,7 @@ class Names(Protocol):
         """The number of a frame; of an unknown one a number that no event has."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Rule:
     """One condition: what its SQL depends on, the values it binds, and how to build it from their parameters."""
 
@@ -49,7 +49,7 @@ class Rule:
 
 def indexed(key: tuple[Any, ...], values: tuple[tuple[Any, TypeEngine[Any]], ...], build: Callable[..., Any]) -> Rule:
     """A condition that an index serves as it is."""
-    return Rule(key, values, build, build)
+    return Rule(key=key, values=values, build=build, search=build)
 
 
 TIME = TIMESTAMP(timezone=True)

@@ -34,7 +34,7 @@ from elm.cues.algebra import FeatureCue, FeatureNamesCue, FeaturesCue
 from elm.cues.relations import Comparison, SetRelation
 from elm.features import ends_within, fold, kind_of, name_tokens, token, tokens, value_text
 from elm.storage.conditions.compare import COMPARE
-from elm.storage.conditions.rule import TEXTS, Bind, Condition, Rule, indexed
+from elm.storage.conditions.rule import TEXTS, Bind, Rule, SqlCondition, indexed
 
 
 def feature_names(cue: FeatureNamesCue) -> Rule:
@@ -72,7 +72,7 @@ def _by_subsets(rule: Rule, given: Sequence[str]) -> Rule:
     subsets = [[*chosen] for size in range(len(given) + 1) for chosen in combinations(given, size)]
     values = (*rule.values, *((subset, TEXTS) for subset in subsets))
 
-    def build(e: FromClause, p: Bind, *within: Bind) -> Condition:
+    def build(e: FromClause, p: Bind, *within: Bind) -> SqlCondition:
         # A parameter for each, not all from one sub-select: the planner then knows how many events have them.
         return and_(rule.build(e, p).is_(true()), names_hash(e) == any_(array([*map(_hash, within)])))
 
@@ -89,7 +89,7 @@ def features(cue: FeaturesCue) -> Rule:
     # IS TRUE keeps the planner from taking the former.
     values = (*rule.values, (ends_within(given), ARRAY(BigInteger)))
 
-    def build(e: FromClause, p: Bind, within: Bind) -> Condition:
+    def build(e: FromClause, p: Bind, within: Bind) -> SqlCondition:
         return and_(rule.build(e, p).is_(true()), e.c.feature_ends == any_(within))
 
     return indexed((*rule.key, "by ends"), values, build)
@@ -102,7 +102,7 @@ _MOST_ENDS = 50
 def _text_set(op: str, relation: SetRelation, given: list[str], name: str) -> Rule:
     values = ((given, TEXTS),)
 
-    def build(e: FromClause, p: Bind) -> Condition:
+    def build(e: FromClause, p: Bind) -> SqlCondition:
         stored = e.c[name]
         match relation:
             case SetRelation.EQUAL:
@@ -118,7 +118,8 @@ def _text_set(op: str, relation: SetRelation, given: list[str], name: str) -> Ru
             case unknown:
                 assert_never(unknown)
 
-    return Rule((op, relation.value), values, build, None if relation is SetRelation.DISJOINT else build)
+    search = None if relation is SetRelation.DISJOINT else build
+    return Rule(key=(op, relation.value), values=values, build=build, search=search)
 
 
 _JSON_KIND = {"b": "boolean", "n": "number", "s": "string"}
@@ -133,10 +134,10 @@ def feature(cue: FeatureCue) -> Rule:
         return indexed(key, values, lambda e, p: e.c.feature_tokens.op("@>", is_comparison=True)(p))
     values = (([fold(cue.name)], TEXTS), (cue.name, Text()), (value_text(cue.value), Text()))
 
-    def search(e: FromClause, names: Bind, *_: Bind) -> Condition:
+    def search(e: FromClause, names: Bind, *_: Bind) -> SqlCondition:
         return e.c.feature_names.op("@>", is_comparison=True)(names)
 
-    def build(e: FromClause, names: Bind, name: Bind, value: Bind) -> Condition:
+    def build(e: FromClause, names: Bind, name: Bind, value: Bind) -> SqlCondition:
         pair = func.json_array_elements(e.c.features).table_valued(column("value"), name="pair").render_derived()
         kind_of_pair = func.json_typeof(pair.c.value.op("->")(literal_column("1")))
         said = pair.c.value.op("->>")(literal_column("1"))
@@ -152,4 +153,4 @@ def feature(cue: FeatureCue) -> Rule:
             exists(select(literal_column("1")).select_from(pair).where(holds)),
         )
 
-    return Rule(key, values, build, search)
+    return Rule(key=key, values=values, build=build, search=search)

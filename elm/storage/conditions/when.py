@@ -14,7 +14,7 @@ from elm.cues.algebra import DurationCue, TimeCue
 from elm.cues.relations import SetRelation, TimeAxis
 from elm.interval import AllenRelation
 from elm.storage.conditions.compare import COMPARE
-from elm.storage.conditions.rule import TIME, Bind, Condition, Rule, indexed
+from elm.storage.conditions.rule import TIME, Bind, Rule, SqlCondition, indexed
 
 _MINUS_INFINITY: Bind = literal_column("'-infinity'::timestamptz")
 _PLUS_INFINITY: Bind = literal_column("'infinity'::timestamptz")
@@ -26,7 +26,7 @@ def time(cue: TimeCue) -> Rule:
     key = ("time", cue.axis.value, cue.relation.value, *(bound is None for bound in bounds))
     values = tuple((bound, TIME) for bound in bounds if bound is not None)
 
-    def build(e: FromClause, *binds: Bind) -> Condition:
+    def build(e: FromClause, *binds: Bind) -> SqlCondition:
         rest = iter(binds)
         c = _MINUS_INFINITY if bounds[0] is None else next(rest)
         d = _PLUS_INFINITY if bounds[1] is None else next(rest)
@@ -44,7 +44,7 @@ def _range(begin: Bind, end: Bind) -> ColumnElement[Any]:
     return func.tstzrange(lower, upper, literal_column("'[]'"), type_=TSTZRANGE)
 
 
-def _during(relation: SetRelation | AllenRelation, period: ColumnElement[Any], c: Bind, d: Bind) -> Condition:
+def _during(relation: SetRelation | AllenRelation, period: ColumnElement[Any], c: Bind, d: Bind) -> SqlCondition:
     a: ColumnElement[Any] = func.lower(period)
     b: ColumnElement[Any] = func.coalesce(func.upper(period), _PLUS_INFINITY)
     window = _range(c, d)
@@ -92,7 +92,7 @@ def _during(relation: SetRelation | AllenRelation, period: ColumnElement[Any], c
             assert_never(unknown)
 
 
-def _at(touching: Callable[[Any], Condition], moment: Bind) -> Condition:
+def _at(touching: Callable[[Any], SqlCondition], moment: Bind) -> SqlCondition:
     """The events that cover an instant: none the beginning of time, the open ones its end."""
     if moment is _MINUS_INFINITY:
         return false()
@@ -100,7 +100,7 @@ def _at(touching: Callable[[Any], Condition], moment: Bind) -> Condition:
     return touching(func.tstzrange(moment, moment, literal_column("'[]'"), type_=TSTZRANGE))
 
 
-def _recorded(relation: SetRelation | AllenRelation, t: ColumnElement[Any], c: Bind, d: Bind) -> Condition:
+def _recorded(relation: SetRelation | AllenRelation, t: ColumnElement[Any], c: Bind, d: Bind) -> SqlCondition:
     match relation:
         case SetRelation.EQUAL | SetRelation.SUPERSET | AllenRelation.EQUALS:
             return and_(t == c, t == d)
@@ -139,7 +139,7 @@ def duration(cue: DurationCue) -> Rule:
     compare = COMPARE[cue.compare]
     # The upper bound of an open event is NULL: the comparison is not true, as it should be.
     return Rule(
-        ("duration", cue.compare.value),
-        values,
-        lambda e, p: compare(func.upper(e.c.period) - func.lower(e.c.period), p),
+        key=("duration", cue.compare.value),
+        values=values,
+        build=lambda e, p: compare(func.upper(e.c.period) - func.lower(e.c.period), p),
     )

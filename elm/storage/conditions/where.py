@@ -11,7 +11,7 @@ from sqlalchemy.types import TypeEngine
 from elm.cues.algebra import RegionCue
 from elm.cues.relations import Place
 from elm.geometry import SpatialRelation
-from elm.storage.conditions.rule import Bind, Condition, Names, Rule
+from elm.storage.conditions.rule import Bind, Names, Rule, SqlCondition
 
 
 def region(cue: RegionCue, names: Names) -> Rule:
@@ -24,7 +24,7 @@ def region(cue: RegionCue, names: Names) -> Rule:
     if cue.distance is not None:
         values = (*values, (cue.distance, Double()))
 
-    def build(e: FromClause, frame: Bind, wkb: Bind, *distance: Bind) -> Condition:
+    def build(e: FromClause, frame: Bind, wkb: Bind, *distance: Bind) -> SqlCondition:
         given = func.ST_GeomFromWKB(wkb, type_=Geometry)
         return and_(e.c[frame_id] == frame, _spatial(cue.relation, e.c[geometry], given, *distance))
 
@@ -32,13 +32,13 @@ def region(cue: RegionCue, names: Names) -> Rule:
     search = None if cue.relation is SpatialRelation.DISJOINT else build
     key = ("region", cue.place.value, cue.relation.value)
     if cue.relation in (SpatialRelation.DISJOINT, SpatialRelation.WITHIN_DISTANCE):
-        return Rule(key, values, build, search)
+        return Rule(key=key, values=values, build=build, search=search)
 
-    def glimpse(e: FromClause, frame: Bind, wkb: Bind) -> Condition:
+    def glimpse(e: FromClause, frame: Bind, wkb: Bind) -> SqlCondition:
         # The boxes around both: a predicate of PostGIS takes 5 us a row, and the index is not there to spare it.
         return e.c[geometry].op("&&", is_comparison=True)(func.ST_GeomFromWKB(wkb, type_=Geometry))
 
-    return Rule(key, values, build, search, glimpse)
+    return Rule(key=key, values=values, build=build, search=search, glimpse=glimpse)
 
 
 def _spatial(relation: SpatialRelation, here: ColumnElement[Any], given: Any, *distance: Bind) -> Any:

@@ -390,3 +390,39 @@ def test_images_of_numpy_are_of_the_type_that_armarx_gives() -> None:
     assert realizes(seen, wanted).level is Level.FULL
     with pytest.raises(NotConvertible, match=r"\[2, 5, 3\] is no NDArray of \[4, 2, 3\] in either order uint8"):
         to_aron({"image": np.zeros((2, 5, 3), np.uint8)}, wanted)
+
+
+@pytest.mark.parametrize(
+    ("value", "wanted", "words"),
+    [
+        ({"x": {"y": 2**63}}, None, r"x\.y: 9223372036854775808 does not fit"),
+        ({"a": np.array(["x"])}, None, r"a: numpy's elements of type <U1"),
+        ({"a": ["x", "\ud800"]}, None, r"a\[1\]: "),
+        ({"a": {"\ud800": 1}}, None, r"a: "),
+        ([2**70], t.List(accepted=t.Long()), r"\[0\]: 1180591620717411303424 does not fit"),
+        (
+            {"cls": 2**31},
+            t.Object(name="Seen", members={"cls": t.Int()}),
+            r"cls: 2147483648 does not fit into 32 bits, and its type is Int: correct it, or have the type say Long",
+        ),
+        ({"a": [10**400]}, t.Dict(accepted=t.List(accepted=t.Double())), r"a\[0\]: "),
+        ({"a": np.array(["x"])}, t.Dict(accepted=t.NDArray()), r"a: numpy's elements"),
+    ],
+)
+def test_what_does_not_fit_is_refused_with_its_path_once(
+    value: object, wanted: t.TypeObject | None, words: str
+) -> None:
+    with pytest.raises(ArmemError, match=f"^{words}") as refused:
+        to_aron(value, wanted)
+    path = words.partition(": ")[0].replace("\\", "")
+    assert str(refused.value).count(f"{path}: ") == 1
+
+
+SIDES = t.IntEnum(name="Sides", values={"LEFT": 1, "RIGHT": 2})
+
+
+def test_a_value_that_an_enumeration_does_not_have_is_refused() -> None:
+    assert to_aron([1, Side.RIGHT, "LEFT"], t.List(accepted=SIDES)) == List([Int(1), Int(2), Int(1)])
+    for wrong in (7, 2**31, np.int32(3), "MIDDLE"):
+        with pytest.raises(NotConvertible, match=r"side: .* is no 'Sides': it has LEFT \(1\), RIGHT \(2\)"):
+            to_aron({"side": wrong}, t.Object(name="Hand", members={"side": SIDES}))

@@ -17,10 +17,10 @@ SECOND = 1_000_000
 
 
 def snapshot(
-    moment: int, *instances: object, entity: MemoryID = CUP, arrived: int = -1, confidence: float = 1.0
+    moment: int, *instances: object, entity: MemoryID = CUP, arrived: int = -1, sent: int = -1, confidence: float = 1.0
 ) -> Snapshot:
     """A snapshot at so many microseconds; each instance's data have one member, `value`."""
-    metadata = Metadata(referenced=moment, arrived=arrived, confidence=confidence)
+    metadata = Metadata(referenced=moment, arrived=arrived, sent=sent, confidence=confidence)
     made = []
     for value in instances:
         data = to_aron({"value": value})

@@ -103,7 +103,35 @@ def test_deciding_changes_nothing() -> None:
     forgetting = OnlineForgetting([FREQUENCY, SIMILARITY])
     assert [forgetting.decide(candidate(1), 1).keep for _ in range(3)] == [True, True, True]
     forgetting.consolidated(candidate(1))
-    assert not forgetting.decide(candidate(1), 1).keep
+    assert [forgetting.decide(candidate(2), 2).keep for _ in range(2)] == [False, False]
+
+
+def test_versions_of_what_is_consolidated_or_forgotten() -> None:
+    def version(moment: int, sent: int) -> Candidate:
+        return Candidate.of(snapshot(moment, 1.0, sent=sent))
+
+    forgetting = OnlineForgetting([Frequency(wait=1.0)])
+    forgetting.consolidated(version(0, 5))
+    forgetting.forgotten(version(9, 5))
+    assert [forgetting.decide(version(0, sent), 9).keep for sent in (4, 5, 6)] == [False, True, True]
+    assert forgetting.decide(version(0, 4), 9).why == "version: -1e-06 < 0"
+    told = [forgetting.decide(version(9, sent), 9).why for sent in (4, 5, 6)]
+    assert told == ["version: -1e-06 < 1e-06", "version: 0 < 1e-06", "frequency: 9e-06 < 1"]
+
+
+def test_what_comes_late_is_compared_with_what_is_next_to_it() -> None:
+    forgetting = OnlineForgetting([Frequency(wait=2.0), Similarity(distance="mae", minimum=2.0, count=2)])
+    for second, value in ((0, 0.0), (10, 4.0), (20, 8.0), (30, 100.0)):
+        forgetting.consolidated(candidate(second * SECOND, value))
+
+    def why(second: int, value: float) -> str:
+        return forgetting.decide(candidate(second * SECOND, value), 0).why
+
+    assert why(21, 0.0) == "frequency: 1 < 2"
+    assert why(19, 0.0) == "frequency: 1 < 2"
+    assert why(25, 7.0) == "frequency: 5 >= 2; similarity: 2 >= 2"
+    assert why(12, 2.0) == "frequency: 2 >= 2; similarity: 2 >= 2"
+    assert why(35, 54.0) == "frequency: 5 >= 2; similarity: 46 >= 2"
 
 
 def test_what_cannot_be_compared_is_kept() -> None:
@@ -166,7 +194,7 @@ def test_idle_is_measured_from_now_and_not_from_the_reference_time() -> None:
 
 
 @given(
-    st.lists(st.tuples(st.integers(0, 30), st.integers(0, 6)), max_size=25),
+    st.lists(st.tuples(st.integers(1, 30), st.integers(0, 6)), max_size=25),
     st.integers(0, 8),
     st.integers(0, 4),
     st.integers(1, 3),
@@ -227,13 +255,3 @@ def test_the_published_threshold_of_time_decay_is_refused() -> None:
 def test_thresholds_that_cannot_be(make: Any) -> None:
     with pytest.raises(InvalidMechanism):
         make()
-
-
-def test_it_says_how_much_it_must_be_told_after_a_restart() -> None:
-    decay = TimeDecay(activation=Exponential(tau=10.0), minimum=0.5)
-    similar = Similarity(distance="mse", minimum=1.0, count=20)
-
-    assert OnlineForgetting().remembers == 0
-    assert OnlineForgetting([decay]).remembers == 0
-    assert OnlineForgetting([Frequency(wait=1.0)]).remembers == 1
-    assert OnlineForgetting([decay, Frequency(wait=1.0), similar]).remembers == 20

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from armem_bridge.long_term import Consolidation, LongTermMemory, arrival_of
 from armem_bridge.long_term.catalogue import Catalogue
 from armem_bridge.long_term.contents import entities, memory_names
-from armem_bridge.long_term.mapping import below
+from armem_bridge.long_term.mapping import below, snapshot_uid
 from armem_bridge.long_term.source import LongTermSource
 from armem_bridge.memory_id import Level, MemoryID
 from armem_bridge.moments import to_datetime
@@ -16,6 +18,7 @@ from elm.event import Event
 from elm.interval import Interval
 from elm.query import ByFeature, Group, Grouping
 from elm.storage.memory import MemoryStore
+from elm.tombstone import RunTombstone
 from tests.armem.long_term.memories import QUICK, behind
 from tests.armem.working.scenes import CUP, commit, snapshot, update
 from tests.conftest import StoreFactory
@@ -28,10 +31,15 @@ class Counting(MemoryStore):
     """A store that counts how often all events are grouped."""
 
     groupings = 0
+    run_tombstones_read = 0
 
     def groups(self, cue: Cue, by: Grouping | ByFeature) -> list[Group]:
         self.groupings += 1
         return super().groups(cue, by)
+
+    def run_tombstones(self) -> Iterator[RunTombstone]:
+        self.run_tombstones_read += 1
+        return super().run_tombstones()
 
 
 def keep(memory: Memory, *given: Snapshot) -> None:
@@ -56,6 +64,27 @@ def test_names_are_looked_up_once_and_again_after_a_forgetting() -> None:
     assert store.groupings == 2
     memory.forget(below(MUG))
     assert catalogue.entities() == []
+    assert store.run_tombstones_read == 0, "they have the hulls of all that was forgotten"
+
+
+def test_what_is_refused_has_no_name() -> None:
+    memory = Memory(MemoryStore())
+    forgotten = snapshot(2, entity=MUG, sent=1)
+    keep(memory, forgotten)
+    memory.commit(Event(type="Seen", parts=(snapshot_uid(forgotten),)))
+    archive = LongTermMemory(memory, QUICK)
+    with behind(archive) as server:
+        source = archive.source("Object")
+        assert source is not None
+        assert source.names(SEGMENT) == ["mug"]
+        memory.forget(below(MUG))
+        assert source.names(SEGMENT) == []
+        # Its tombstone is still there, for it was a part: it was forgotten, and stays so.
+        commit(server, update(2, entity=MUG, sent=1), update(3))
+        assert archive.flush(timeout=30)
+
+        assert [str(each.snapshot.id) for each in archive.set_aside] == [f"{MUG}/2"]
+        assert source.names(SEGMENT) == ["blue-cup"]
 
 
 def test_what_others_write_is_found_after_a_while() -> None:

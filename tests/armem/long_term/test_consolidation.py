@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import logging
 import time
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
 from threading import Thread
 
 import pytest
@@ -17,11 +20,14 @@ from armem_bridge.memory_id import MemoryID
 from armem_bridge.moments import GREATEST
 from armem_bridge.working import AddSegment, Commit, CommitResult, Evicted
 from armem_bridge.working.access_statistics import UNUSED, Usage
+from armem_bridge.working.history import Source
 from armem_bridge.working.query import AllSnapshots
 from elm import cues
 from elm.app import Memory
 from elm.errors import DatabaseUnfit, DatabaseUnreachable, InvalidValue, StoreFailure
 from elm.geometry import Region
+from elm.storage.memory import MemoryStore
+from elm.store import Arrival, BatchReport
 from tests.armem.long_term.memories import QUICK, FailingStore, behind, in_process
 from tests.armem.long_term.test_source import HeldStore
 from tests.armem.working.oracle import about_the_cup
@@ -30,7 +36,7 @@ from tests.conftest import StoreFactory
 
 MUG = CUP.with_entity("mug")
 DURABLE = Consolidation(durable=True, wait=0.1, least_pause=0.001)
-EVICTED = Consolidation(when=When.ON_EVICTION, wait=0.1, least_pause=0.001)
+EVICTED = Consolidation(when=When.ON_EVICTION, wait=0.1, least_pause=0.001, at_stop=False)
 
 
 def kept(memory: Memory, entity: MemoryID = CUP) -> list[int]:
@@ -311,20 +317,17 @@ def test_several_threads_commit() -> None:
 
 
 class Odd:
-    """Keeps snapshots with an odd reference time, and remembers what it was told."""
-
-    remembers = 16
+    """Keeps snapshots with an odd reference time, and remembers what it was asked and could know."""
 
     def __init__(self) -> None:
-        self.told: list[tuple[int, int]] = []
-        self.asked: list[tuple[int, Usage]] = []
+        self.asked: list[tuple[int, Usage, int]] = []
+        self.known: list[list[int]] = []
 
-    def keeps(self, evicted: Evicted, now: int) -> bool:
-        self.asked.append((evicted.snapshot.referenced, evicted.usage))
-        return evicted.snapshot.referenced % 2 == 1
-
-    def kept(self, evicted: Evicted, now: int) -> None:
-        self.told.append((evicted.snapshot.referenced, now))
+    def lets_through(self, evicted: Evicted, now: int, known: Source) -> bool:
+        snapshot = evicted.snapshot
+        self.asked.append((snapshot.referenced, evicted.usage, now))
+        self.known.append([each.referenced for each in known.history(snapshot.id.entity_id).latest(3)])
+        return snapshot.referenced % 2 == 1
 
 
 def test_what_leaves_working_memory_passes_a_gate() -> None:
@@ -337,8 +340,8 @@ def test_what_leaves_working_memory_passes_a_gate() -> None:
         assert archive.flush(timeout=30)
         assert kept(memory) == [1, 3]
         assert archive.status()["forgotten"] == 1
-    assert gate.asked == [(1, Usage(count=1, last=1_000_000_000)), (2, UNUSED), (3, UNUSED)]
-    assert gate.told == [(1, 77), (3, 77)]
+    assert gate.asked == [(1, Usage(count=1, last=1_000_000_000), 77), (2, UNUSED, 77), (3, UNUSED, 77)]
+    assert gate.known == [[], [1], [1]]
 
 
 def test_without_a_gate_all_that_leaves_is_kept_and_nothing_else() -> None:
@@ -349,7 +352,55 @@ def test_without_a_gate_all_that_leaves_is_kept_and_nothing_else() -> None:
     assert kept(archive.memory) == [1, 2, 3]
 
 
-def test_a_gate_is_told_what_long_term_memory_has() -> None:
+def test_a_gate_is_not_asked_about_versions_that_do_not_count() -> None:
+    memory, gate = in_process(), Odd()
+    archive = LongTermMemory(memory, EVICTED, gate=gate)
+    with behind(archive, limits={MEMORY: 1}) as server:
+        commit(server, update(1, "a", sent=2), update(1, "b", sent=3), update(1, "c", sent=1), update(3))
+        assert archive.flush(timeout=30)
+        assert archive.status()["forgotten"] == 2
+    assert [moment for moment, *_ in gate.asked] == [1]
+    assert [each.sent for each in LongTermSource(memory).history(CUP).all()] == [3]
+    assert memory.recall().count() == 1
+
+
+@pytest.mark.parametrize("gated", [False, True])
+def test_what_is_still_in_working_memory_leaves_when_all_is_closed(gated: bool) -> None:
+    memory = in_process()
+    archive = LongTermMemory(memory, replace(EVICTED, at_stop=True), gate=Odd() if gated else None)
+    with behind(archive, limits={MEMORY: 2}) as server:
+        commit(server, *(update(moment) for moment in (1, 2, 3, 4, 5)), update(7, entity=MUG))
+    assert kept(memory) == ([1, 3, 5] if gated else [1, 2, 3, 4, 5])
+    assert kept(memory, MUG) == [7]
+    archive.close()
+    assert memory.recall().count() == (4 if gated else 6)
+
+
+def test_prior_knowledge_does_not_leave_when_all_is_closed(tmp_path: Path) -> None:
+    known = tmp_path / "known.json"
+    known.write_text('{"core_segment": "Class", "provider_segment": "P", "entities": {"e": [{"instances": [{}]}]}}')
+    memory = in_process()
+    with behind(LongTermMemory(memory, replace(EVICTED, at_stop=True)), prior_knowledge=[known]) as server:
+        commit(server, update(1))
+        assert server.status().snapshots == 2
+    assert memory.recall().count() == 1
+
+
+def test_closing_waits_as_long_as_something_becomes_durable() -> None:
+    class Slow(MemoryStore):
+        def load(self, arrivals: Sequence[Arrival]) -> BatchReport:
+            time.sleep(0.15)
+            return super().load(arrivals)
+
+    archive = LongTermMemory(Memory(Slow()), replace(EVICTED, at_stop=True, batch=1))
+    with object_memory(archive=archive) as server:
+        archive.serve(server)
+        commit(server, *(update(moment) for moment in range(6)))
+    archive.close(timeout=0.5)
+    assert kept(archive.memory) == list(range(6))
+
+
+def test_a_gate_knows_what_long_term_memory_has() -> None:
     memory = in_process()
     with behind(LongTermMemory(memory, QUICK)) as server:
         commit(server, *(update(moment) for moment in range(20)), update(3, entity=MUG))
@@ -357,7 +408,8 @@ def test_a_gate_is_told_what_long_term_memory_has() -> None:
     archive = LongTermMemory(memory, EVICTED, gate=gate, clock=lambda: 77)
     with behind(archive, limits={MEMORY: 1}) as server:
         commit(server, update(30), update(31), update(32))
-    assert gate.told == [*((moment, 1_000_000_000) for moment in range(4, 20)), (31, 77)]
+    assert gate.known == [[17, 18, 19], [17, 18, 19]]
+    assert [(moment, now) for moment, _, now in gate.asked] == [(30, 77), (31, 77)]
 
 
 def test_the_gate_is_asked_once_however_often_the_database_fails() -> None:
@@ -366,13 +418,13 @@ def test_the_gate_is_asked_once_however_often_the_database_fails() -> None:
     archive = LongTermMemory(Memory(store), EVICTED, gate=gate)
     with behind(archive, limits={MEMORY: 1}) as server:
         commit(server, update(1), update(2), update(3))
-    assert [moment for moment, _ in gate.asked] == [1, 2]
+    assert [moment for moment, *_ in gate.asked] == [1, 2]
     assert kept(archive.memory) == [1]
 
 
 def test_nothing_is_forgotten_because_a_gate_fails(caplog: pytest.LogCaptureFixture) -> None:
     class Broken(Odd):
-        def keeps(self, evicted: Evicted, now: int) -> bool:
+        def lets_through(self, evicted: Evicted, now: int, known: Source) -> bool:
             raise ZeroDivisionError("a bug")
 
     archive = LongTermMemory(in_process(), EVICTED, gate=Broken())
@@ -402,7 +454,7 @@ def test_a_name_that_is_no_agent_is_refused_at_once() -> None:
 
 def test_commits_wait_for_room_for_what_is_evicted() -> None:
     store = HeldStore()
-    archive = LongTermMemory(Memory(store), Consolidation(when=When.ON_EVICTION, backlog=2, wait=0.01))
+    archive = LongTermMemory(Memory(store), replace(EVICTED, backlog=2, wait=0.01))
     with behind(archive, limits={MEMORY: 1}) as server:
         commit(server, update(1), update(2), update(3))
         result: CommitResult = server.commit(Commit(updates=[update(4)]))
@@ -418,6 +470,8 @@ def test_commits_wait_for_room_for_what_is_evicted() -> None:
     [
         ({"when": "sometimes"}, "consolidated on_commit or on_eviction, not 'sometimes'"),
         ({"when": "on_eviction", "durable": True}, "only durable with when='on_commit'"),
+        ({"at_stop": False}, "goes with when='on_eviction'"),
+        ({"when": "on_eviction", "at_stop": "drop"}, "at_stop of consolidation is true or false, not 'drop'"),
         ({"backlog": 0}, "backlog of consolidation is 1 or more, not 0"),
         ({"batch": True}, "batch of consolidation is 1 or more, not True"),
         ({"wait": -1}, "wait of consolidation is 0 s or more, not -1"),

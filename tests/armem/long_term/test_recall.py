@@ -28,7 +28,7 @@ def memory(store_factory: StoreFactory) -> Memory:
     with behind(archive) as server:
         commit(server, *(posed(moment, 100 * moment, 0, sent=moment) for moment in range(10, 50, 10)))
         commit(server, posed(20, 9000, 0, sent=1), posed(30, 9000, 0, sent=99))
-        commit(server, posed(25, 2000, 0, entity=MUG))
+        commit(server, posed(25, 2000, 0, entity=MUG, sent=25))
     return memory
 
 

@@ -79,8 +79,29 @@ def test_only_so_many_poses_are_remembered() -> None:
 def test_wrong_settings_are_refused() -> None:
     with pytest.raises(InvalidArchive, match="poses hold for 0"):
         places(max_age=-1)
-    with pytest.raises(InvalidValue, match="radius"):
-        places(footprint=0)
+    with pytest.raises(InvalidValue, match="frame"):
+        places(frame="")
+
+
+@pytest.mark.parametrize(
+    ("footprint", "says"),
+    [
+        (0, "the radius of a region must be greater than 0"),
+        (float("nan"), "the radius of a region must be greater than 0"),
+        ((), "three or more corners, each a finite x and y"),
+        (((0, 0), (1, 1)), "three or more corners, each a finite x and y"),
+        (((0, 0), (1, 1), (1,)), "three or more corners, each a finite x and y"),
+        (((0, 0, 0), (1, 1, 0), (1, 0, 0)), "three or more corners, each a finite x and y"),
+        (((0, 0), (1, 1), (1, float("inf"))), "each a finite x and y"),
+        (((0, 0), (1, 1), (1, 0), (0, 1)), "the polygon is not valid: Self-intersection"),
+        (((0, 0), (1, 1), (2, 2)), "the polygon is not valid"),
+        (((0, 0), (1, 1), "x"), "three or more corners, each a finite x and y"),
+    ],
+)
+def test_footprints_that_are_none_are_refused(footprint: object, says: str) -> None:
+    with pytest.raises(InvalidArchive, match="the footprint of a robot") as refused:
+        places(footprint=footprint)
+    assert says in str(refused.value)
 
 
 def test_snapshots_have_the_region_of_the_robot() -> None:

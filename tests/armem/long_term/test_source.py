@@ -32,7 +32,7 @@ from tests.armem.working.oracle import (
     snapshot_queries,
     what_counts,
 )
-from tests.armem.working.scenes import CUP, MEMORY, commit, contents, moments, snapshot, update
+from tests.armem.working.scenes import CUP, MEMORY, NOW, commit, contents, moments, snapshot, update
 from tests.conftest import StoreFactory
 
 limits = st.fixed_dictionaries(
@@ -240,7 +240,7 @@ def test_by_hand() -> None:
         assert find(QueryTarget.BOTH, TimeRange(min_timestamp=15, max_timestamp=35)) == [20, 30]
         earliest = server.get(CUP.with_timestamp(10), target=QueryTarget.LTM)
         assert earliest is not None
-        assert earliest.instances == snapshot(10).instances
+        assert earliest.instances == snapshot(10, sent=NOW).instances
 
 
 @pytest.mark.parametrize("when", list(When))

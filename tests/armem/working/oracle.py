@@ -181,11 +181,11 @@ versions = st.builds(
     names,
     times,
     st.integers(0, 2),
-    st.integers(-1, 2),
+    st.integers(0, 3),
 )
 histories = st.lists(
     st.builds(
-        lambda moment, value, sent: snapshot(moment, value, sent=sent), times, st.integers(0, 2), st.integers(-1, 2)
+        lambda moment, value, sent: snapshot(moment, value, sent=sent), times, st.integers(0, 2), st.integers(0, 3)
     ),
     max_size=12,
 )

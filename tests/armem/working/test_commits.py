@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import logging
 import math
+from datetime import UTC, datetime
 from itertools import permutations
+from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 import armem_bridge.aron.type_objects as t
 from armem_bridge.aron.data import Dict, Double, Int, List, NDArray, String
-from armem_bridge.memory_id import MemoryID
+from armem_bridge.memory_id import InvalidMemoryID, MemoryID
 from armem_bridge.moments import INVALID
 from armem_bridge.working import Commit, CoreSegmentDefinition, EntityUpdate, MemoryServer, Query, Snapshot
 from armem_bridge.working.metadata import Metadata
@@ -24,7 +27,7 @@ from armem_bridge.working.query import (
     MemoryQuery,
     ProviderSegmentQuery,
 )
-from armem_bridge.working.refusals import InvalidServer, ServerClosed
+from armem_bridge.working.refusals import InvalidCommit, InvalidServer, ServerClosed
 from armem_bridge.working.snapshot import Instance, snapshot_hash, supersedes
 from tests.armem.working.archives import BrokenArchive, ListArchive
 from tests.armem.working.oracle import about_the_cup, memories, what_counts
@@ -64,7 +67,7 @@ def test_a_commit_is_acknowledged_update_by_update() -> None:
 
 def test_metadata_are_those_of_the_update() -> None:
     server = object_memory()
-    several = EntityUpdate(entity=CUP, instances=(data(1), None, data(2)), referenced=5, sent=INVALID, confidence=0.25)
+    several = EntityUpdate(entity=CUP, instances=(data(1), None, data(2)), referenced=5, sent=3, confidence=0.25)
     commit(server, several)
     found = server.get(CUP)
 
@@ -73,7 +76,7 @@ def test_metadata_are_those_of_the_update() -> None:
     assert {
         (each.metadata.confidence, each.metadata.referenced, each.metadata.sent, each.metadata.arrived)
         for each in found.instances
-    } == {(0.25, 5, -1, NOW)}
+    } == {(0.25, 5, 3, NOW)}
 
 
 def test_a_snapshot_may_be_empty() -> None:
@@ -110,7 +113,7 @@ POSITION = t.Object(name="Position", members={"value": t.Int(), "frame": t.Strin
         ({"confidence": True}, "confidence"),
         ({"confidence": 10**400}, "confidence"),
         ({"instances": (Dict({}), List([]))}, "instance 1 .* is a List"),
-        ({"instances": [Dict({})]}, "not a list"),
+        ({"instances": {"value": Int(1)}}, "not a dict"),
         ({"instances": (HUGE,)}, "1,000,005 bytes of data, over the limit of 100,000"),
         ({"instances": (Dict({"text": List([String("x" * 100_000)])}),)}, "100,004 bytes"),
         ({"instances": (Dict({"value": Double(1.0)}),)}, "value is a Double, and its type Int"),
@@ -158,11 +161,42 @@ def test_what_comes_late_is_inserted_at_its_time() -> None:
 @pytest.mark.parametrize("order", list(permutations(range(3))))
 def test_the_version_sent_last_counts(order: tuple[int, ...]) -> None:
     server = object_memory(archive=ListArchive())
-    versions = [update(5, "first", sent=1), update(5, "second", sent=2), update(5, "unknown")]
+    versions = [update(5, "first", sent=1), update(5, "second", sent=2), update(5, "zeroth", sent=0)]
     for number in order:
         commit(server, versions[number])
 
     assert values(server) == ["second"]
+
+
+@pytest.mark.parametrize("words", [("wrong", "corrected"), ("corrected", "wrong")])
+@pytest.mark.parametrize("unset", [-1, INVALID])
+def test_without_a_sent_time_the_later_commit_counts(words: tuple[str, str], unset: int) -> None:
+    time = iter(range(100, 200))
+    archive = ListArchive()
+    server = object_memory(clock=lambda: next(time), archive=archive)
+    for word in words:
+        commit(server, update(5, word, sent=unset))
+
+    assert values(server) == [words[1]]
+    assert [(each.sent, each.instances[0].metadata.arrived) for each in archive.consolidated] == [
+        (100, 100),
+        (101, 101),
+    ]
+    assert server.status().delayed == 0
+
+
+def test_the_same_commit_with_a_sent_time_changes_nothing_and_without_one_is_a_version() -> None:
+    time = iter(range(100, 200))
+    archive = ListArchive()
+    server = object_memory(clock=lambda: next(time), archive=archive)
+    for _ in range(2):
+        commit(server, update(5, "said", sent=7))
+    assert archive.evicted == []
+    for _ in range(2):
+        commit(server, update(6, "unsaid"))
+
+    assert [each.snapshot.sent for each in archive.evicted] == [102]
+    assert values(server) == ["said", "unsaid"]
 
 
 def test_of_versions_sent_at_once_the_greater_hash_counts() -> None:
@@ -292,3 +326,83 @@ def test_a_closed_server_takes_nothing_and_can_be_read() -> None:
 def test_servers_that_cannot_be(name: str, cores: list[str], words: str) -> None:
     with pytest.raises(InvalidServer, match=words):
         MemoryServer(name, [CoreSegmentDefinition(name=each) for each in cores])
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"core_segments": ["Instance"]}, r"'Object' is a CoreSegmentDefinition, not 'Instance'"),
+        ({"limits": {"Object": 3}}, "set by a MemoryID, not by 'Object'"),
+        ({"core_segments": [CoreSegmentDefinition(name="A", aron_type=t.Int())]}, "'A' .* type Int, and instances are"),
+        ({"core_segments": [CoreSegmentDefinition(name="A", aron_type="Cup")]}, "'A' .* has the type 'Cup'"),  # type: ignore[arg-type]
+    ],
+)
+def test_definitions_of_servers_that_cannot_be(wrong: dict[str, Any], words: str) -> None:
+    with pytest.raises(InvalidServer, match=words):
+        MemoryServer("Object", **wrong)
+
+
+def test_segments_may_have_any_type_that_a_dict_is_of() -> None:
+    for aron_type in (t.Object(name="Cup"), t.Dict(accepted=t.Int()), t.Any(), None):
+        server = MemoryServer("Object", [CoreSegmentDefinition(name="Instance", aron_type=aron_type)])
+        commit(server, update(5))
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        (update(5), r"is a Commit, not a EntityUpdate: .* Commit\(updates=\[...\]\)"),
+        ([update(5)], "is a Commit, not a list"),
+        (None, "not a NoneType"),
+    ],
+)
+def test_what_is_no_commit_is_refused(wrong: Any, words: str) -> None:
+    with pytest.raises(InvalidCommit, match=words):
+        object_memory().commit(wrong)
+
+
+def test_a_single_update_is_no_list_of_them() -> None:
+    with pytest.raises(InvalidCommit, match="put a single one into a list"):
+        Commit(updates=update(5))  # type: ignore[arg-type]
+
+
+def test_what_is_no_update_is_refused_by_itself() -> None:
+    result = object_memory().commit(Commit(updates=[update(5), CUP, update(6)]))  # type: ignore[list-item]
+
+    assert [each.success for each in result.results] == [True, False, True]
+    assert "this is a MemoryID" in result.errors[0]
+
+
+def test_updates_take_lists_datetimes_and_integers_of_numpy() -> None:
+    at = datetime(1970, 1, 1, 0, 0, 5, tzinfo=UTC)
+    server = object_memory()
+    commit(server, EntityUpdate(entity=CUP, instances=[data(1), data(2)], referenced=at, sent=at))
+    commit(server, EntityUpdate(entity=CUP, instances=(), referenced=np.int64(7), sent=np.int64(8)))  # type: ignore[arg-type]
+
+    assert moments(server.query(CUPS)) == [7, 5_000_000]
+    found = server.get(CUP)
+    assert found is not None
+    assert [each.metadata.sent for each in found.instances] == [5_000_000, 5_000_000]
+
+
+@pytest.mark.parametrize("wrong", [datetime(2026, 1, 1), datetime(1969, 1, 1, tzinfo=UTC), True, "now", 2.0])  # noqa: DTZ001
+def test_what_is_no_time_is_refused_by_itself(wrong: Any) -> None:
+    late = EntityUpdate(entity=CUP, instances=(), referenced=wrong)
+    result = object_memory().commit(Commit(updates=[late, update(5)]))
+
+    assert [each.success for each in result.results] == [False, True]
+    assert "or as a datetime with its zone" in result.errors[0]
+
+
+def test_a_snapshot_is_got_by_an_id_and_not_by_text() -> None:
+    with pytest.raises(InvalidMemoryID, match=r"not by 'Object/Instance': .* MemoryID\.parse"):
+        object_memory().get("Object/Instance")  # type: ignore[arg-type]
+
+
+def test_an_instance_is_got_only_where_there_is_one() -> None:
+    server = object_memory()
+    commit(server, EntityUpdate(entity=CUP, instances=(data(1), data(2)), referenced=5))
+    snapshot_id = CUP.with_timestamp(5)
+
+    assert server.get(snapshot_id.with_instance(1)) == server.get(snapshot_id)
+    assert server.get(snapshot_id.with_instance(2)) is None

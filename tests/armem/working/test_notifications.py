@@ -5,13 +5,14 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Sequence
+from typing import Any
 
 import pytest
 
 from armem_bridge.memory_id import MemoryID
 from armem_bridge.working import Commit
 from armem_bridge.working.query import LatestSnapshots
-from armem_bridge.working.refusals import ServerClosed
+from armem_bridge.working.refusals import InvalidSubscription, ServerClosed
 from tests.armem.working.oracle import about_the_cup
 from tests.armem.working.scenes import CUP, MEMORY, commit, object_memory, update
 
@@ -161,3 +162,24 @@ def test_closing_a_server_ends_its_threads() -> None:
     with pytest.raises(ServerClosed):
         server.subscribe(lambda updated: None)
     assert list(server.query(about_the_cup(LatestSnapshots())).snapshots()) == []
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"subscribed": "Object/Instance"}, r"is a MemoryID, not 'Object/Instance': .* MemoryID\.parse"),
+        ({"subscribed": None}, "is a MemoryID, not None"),
+        ({"listener": "print"}, "a str cannot be"),
+        ({"queue_limit": 0}, "1 or more: not 0"),
+        ({"queue_limit": 2.5}, "1 or more: not 2.5"),
+        ({"queue_limit": None}, "1 or more: not None"),
+    ],
+)
+def test_who_cannot_listen_like_this_is_told_at_once_and_no_commit_suffers(wrong: dict[str, Any], words: str) -> None:
+    given: dict[str, Any] = {"listener": print, "subscribed": CUP, "queue_limit": 1} | wrong
+    with object_memory() as server:
+        with pytest.raises(InvalidSubscription, match=words):
+            server.subscribe(**given)
+        commit(server, update(1))
+        commit(server, update(2))
+        assert server.status().listeners == ()

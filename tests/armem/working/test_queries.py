@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from datetime import timedelta
+
 import msgspec
 import pytest
 from hypothesis import given, settings
@@ -9,7 +11,16 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from armem_bridge.memory_id import MemoryID
-from armem_bridge.working import Commit, CoreSegmentDefinition, EntityUpdate, MemoryServer, Query, QueryTarget, Snapshot
+from armem_bridge.working import (
+    Commit,
+    CoreSegmentDefinition,
+    EntityUpdate,
+    MemoryServer,
+    Query,
+    QueryBuilder,
+    QueryTarget,
+    Snapshot,
+)
 from armem_bridge.working.query import (
     AllNames,
     AllSnapshots,
@@ -277,3 +288,30 @@ def test_targets_may_be_given_by_their_words() -> None:
     assert Query(target="both").target is QueryTarget.BOTH  # type: ignore[arg-type]
     assert Commit().updates == ()
     assert RegexNames(pattern="a.*").pattern == "a.*"
+
+
+def test_what_is_no_query_is_refused() -> None:
+    with pytest.raises(InvalidQuery, match=r"not with a QueryBuilder: .* with build\(\)"):
+        object_memory().query(QueryBuilder())  # type: ignore[arg-type]
+
+
+def test_text_selects_nothing() -> None:
+    with pytest.raises(InvalidQuery, match=r"is a MemoryID, not 'Object/Instance': .* MemoryID\.parse"):
+        QueryBuilder().select("Object/Instance")  # type: ignore[arg-type]
+
+
+def test_queries_know_whole_snapshots_only() -> None:
+    of_instance, of_snapshot = QueryBuilder(), QueryBuilder()
+    of_instance.select(CUP.with_timestamp(5).with_instance(1))
+    of_snapshot.select(CUP.with_timestamp(5))
+
+    assert of_instance.build() == of_snapshot.build()
+
+
+def test_a_tolerance_may_be_a_timedelta() -> None:
+    def built(eps: int | timedelta) -> Query:
+        builder = QueryBuilder()
+        builder.core_segments.all().provider_segments.all().entities.all().snapshots.approximate(5, eps=eps)
+        return builder.build()
+
+    assert built(timedelta(milliseconds=2)) == built(2000)

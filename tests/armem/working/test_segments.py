@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from threading import Thread
 
 import pytest
 
@@ -21,10 +22,10 @@ from armem_bridge.working import (
     Snapshot,
 )
 from armem_bridge.working.query import AllSnapshots
-from armem_bridge.working.refusals import ServerClosed
+from armem_bridge.working.refusals import InvalidCommit, ServerClosed
 from tests.armem.working.archives import ListArchive
 from tests.armem.working.oracle import about_the_cup
-from tests.armem.working.scenes import CUP, commit, contents, data, moments, object_memory, update
+from tests.armem.working.scenes import CUP, commit, contents, moments, object_memory, update
 
 BASE = t.Object(name="Base", members={"value": t.Int()})
 EXTENDING = t.Object(name="Extending", extends=BASE, members={"colour": t.String()})
@@ -130,26 +131,42 @@ def test_clearing_takes_snapshots_out_of_working_memory_only() -> None:
     assert moments(server.query(about_the_cup(AllSnapshots()))) == [9]
 
 
-class Retyping(ListArchive):
-    """Another client gives the segment a type while a commit is on its way."""
+class Meanwhile(ListArchive):
+    """While it consolidates, another client wants a segment of a type; the commit does not wait for that."""
 
     server: MemoryServer
 
+    def __init__(self) -> None:
+        super().__init__()
+        self.results: list[SegmentResult] = []
+        self._client = Thread(target=self._add)
+
     def consolidate(self, snapshots: Sequence[Snapshot]) -> None:
-        assert add(self.server, "Free", "P", BASE).success
+        super().consolidate(snapshots)
+        self._client.start()
+        self._client.join(0.3)
+
+    def wait(self) -> None:
+        """Wait until the other client has its answer."""
+        self._client.join(30)
+        assert not self._client.is_alive()
+
+    def _add(self) -> None:
+        self.results.append(add(self.server, "Free", "P", BASE))
 
 
-def test_a_type_that_comes_during_a_commit_counts() -> None:
-    archive = Retyping()
+def test_a_type_that_comes_during_a_commit_waits_for_its_end() -> None:
+    archive = Meanwhile()
     server = archive.server = typed(archive)
     entity = MemoryID(memory="Object", core_segment="Free", provider_segment="P", entity="e")
     updates = [update(1, 5, entity=entity), update(2, "five", entity=entity), update(-1, entity=entity)]
     result = server.commit(Commit(updates=updates))
+    archive.wait()
 
-    assert [each.success for each in result.results] == [True, False, False]
-    assert "value is a String, and its type Int" in result.errors[0]
-    assert server.status().snapshots == 1
-    assert data(5) == server.get(entity).instances[0].data  # type: ignore[union-attr]
+    acknowledged = [each.snapshot for each in result.results if each.success]
+    assert acknowledged == [each.id for each in archive.kept] == [entity.with_timestamp(1), entity.with_timestamp(2)]
+    assert "has entities and another type" in archive.results[0].error
+    assert server.status().snapshots == 2
 
 
 def test_a_closed_server_adds_nothing() -> None:
@@ -158,3 +175,21 @@ def test_a_closed_server_adds_nothing() -> None:
 
     with pytest.raises(ServerClosed):
         add(server, "Instance", "P")
+
+
+WISH = AddSegment(core_segment="Class", provider_segment="P")
+
+
+def test_a_wish_is_in_a_list() -> None:
+    for wrong in (WISH, [WISH, "Instance"], "Instance", 3):
+        with pytest.raises(InvalidCommit, match="a list of AddSegment"):
+            object_memory().add_segments(wrong)  # type: ignore[arg-type]
+
+
+def test_a_segment_that_nothing_could_be_committed_to_is_not_added() -> None:
+    (result,) = object_memory().add_segments(
+        [AddSegment(core_segment="Class", provider_segment="P", aron_type=t.Int())]
+    )
+
+    assert not result.success
+    assert "has the type Int, and instances are Dicts" in result.error

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 
+import pytest
+
 from armem_bridge.memory_id import MemoryID
-from armem_bridge.working import AddSegment, Query, QueryBuilder, QueryTarget
+from armem_bridge.working import AddSegment, MemoryServer, Query, QueryBuilder, QueryTarget, Snapshot
 from armem_bridge.working.query import AllSnapshots
+from armem_bridge.working.refusals import ServerClosed
 from tests.armem.working.archives import ListArchive
 from tests.armem.working.oracle import about_the_cup
 from tests.armem.working.scenes import CUP, commit, moments, object_memory, update
@@ -115,3 +119,126 @@ def test_clearing_while_others_work() -> None:
         assert server.status().evicted == 200 - len(left)
 
     assert [each.timestamp for each in heard] == list(range(200))
+
+
+class Together(ListArchive):
+    """An archive that consolidates only where two commits are there at once."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._both = threading.Barrier(2, timeout=30)
+
+    def consolidate(self, snapshots: Sequence[Snapshot]) -> None:
+        self._both.wait()
+        super().consolidate(snapshots)
+
+
+def test_commits_go_on_beside_each_other() -> None:
+    server = object_memory(archive=Together())
+
+    at_once(lambda: commit(server, update(1)), lambda: commit(server, update(2)))
+
+    assert moments(server.query(about_the_cup(AllSnapshots()))) == [1, 2]
+
+
+class Slow(ListArchive):
+    """An archive that consolidates when it is let to."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.entered, self.go_on = threading.Event(), threading.Event()
+
+    def consolidate(self, snapshots: Sequence[Snapshot]) -> None:
+        self.entered.set()
+        assert self.go_on.wait(30)
+        super().consolidate(snapshots)
+
+
+def add_segment(server: MemoryServer, name: str) -> None:
+    """Add a provider segment beside the cup's."""
+    wish = AddSegment(core_segment="Instance", provider_segment=name)
+    assert server.add_segments([wish])[0].success
+
+
+def test_segments_wait_for_commits_and_commits_for_segments() -> None:
+    archive = Slow()
+    server = object_memory(archive=archive)
+    order: list[str] = []
+
+    def first() -> None:
+        commit(server, update(1))
+        order.append("first")
+
+    def segment() -> None:
+        assert archive.entered.wait(30)
+        add_segment(server, "Simox")
+        order.append("segment")
+
+    def second() -> None:
+        assert archive.entered.wait(30)
+        time.sleep(0.2)
+        commit(server, update(2))
+        order.append("second")
+
+    def look() -> None:
+        assert archive.entered.wait(30)
+        time.sleep(0.5)
+        assert not server.get(CUP), "reading waits for nobody"
+        assert order == []
+        archive.go_on.set()
+
+    at_once(first, segment, second, look)
+    assert sorted(order) == ["first", "second", "segment"]
+    assert server.status().provider_segments == 2
+
+
+def test_listeners_commit_while_segments_are_added() -> None:
+    with object_memory() as server:
+
+        def answer(updated: Sequence[MemoryID]) -> None:
+            for each in updated:
+                commit(server, update(each.timestamp, entity=CUP.with_entity("answer")))
+
+        subscription = server.subscribe(answer, CUP)
+
+        def write() -> None:
+            for moment in range(100):
+                commit(server, update(moment))
+
+        def add() -> None:
+            for number in range(100):
+                add_segment(server, str(number))
+
+        at_once(write, add, add)
+        assert subscription.flush(30)
+        assert subscription.status().failures == 0
+        answers = CUP.with_entity("answer")
+        assert moments(server.query(about_the_cup(AllSnapshots()))) == list(range(100))
+        assert server.status().snapshots == 200
+        assert server.get(answers.with_timestamp(99))
+
+
+def test_closing_waits_for_who_is_at_the_door() -> None:
+    archive = Slow()
+    server = object_memory(archive=archive)
+    known: list[int] = []
+    refused: list[ServerClosed] = []
+
+    def late() -> None:
+        assert archive.entered.wait(30)
+        try:
+            add_segment(server, "Simox")
+        except ServerClosed as error:
+            refused.append(error)
+
+    def close() -> None:
+        assert archive.entered.wait(30)
+        time.sleep(0.3)
+        archive.go_on.set()
+        server.close()
+        known.append(server.status().provider_segments)
+
+    at_once(lambda: commit(server, update(1)), late, close)
+    assert known == [1 if refused else 2]
+    with pytest.raises(ServerClosed):
+        add_segment(server, "Simox")

@@ -1,7 +1,0 @@
-"""`python -m elm.cli`: the command line where its script is not on the path."""
-
-from __future__ import annotations
-
-from elm.cli import main
-
-main()
