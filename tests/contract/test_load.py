@@ -236,6 +236,13 @@ def lived(store: Store) -> Store:
     return store
 
 
+def test_a_whole_of_a_forgotten_part_is_kept_though_the_part_is_refused(store: Store) -> None:
+    report = lived(store).load(arrivals(one(GONE), whole(D, GONE)))
+
+    assert [refusal.index for refusal in report.refused] == [0]
+    assert report.new == 1
+
+
 UIDS = st.sampled_from([A, B, C, D, GONE, OVER, CLOSED])
 ROWS = st.one_of(
     st.builds(one, UIDS, st.sampled_from([1, 3, None]), type=st.sampled_from(["Event", "Event", "Dance"])),
