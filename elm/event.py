@@ -48,8 +48,30 @@ class Payload:
         return f"Payload({self.media_type!r}, {len(self.data):,} bytes)"
 
 
+class _Described:
+    """What an event and a stored one tell of themselves alike."""
+
+    __slots__ = ()
+
+    features: tuple[Feature, ...]
+    parts: tuple[UUID, ...]
+
+    @property
+    def is_complex(self) -> bool:
+        """Whether the event has sub-events (Def 6)."""
+        return bool(self.parts)
+
+    def values(self, name: str) -> tuple[FeatureValue, ...]:
+        """All values of the feature `name`, in the order given at birth."""
+        return tuple(value for known, value in self.features if known == name)
+
+    def value(self, name: str) -> FeatureValue | None:
+        """The first value of the feature `name`, or None."""
+        return next(iter(self.values(name)), None)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Event:
+class Event(_Described):
     """An event to commit (Def 3): atomic, or complex when it has parts.
 
     `interval` is needed unless there are parts: the extents of a complex event derive from its parts
@@ -124,19 +146,6 @@ class Event:
     def __hash__(self) -> int:
         return hash(self.uid)
 
-    @property
-    def is_complex(self) -> bool:
-        """Whether the event has sub-events (Def 6)."""
-        return bool(self.parts)
-
-    def values(self, name: str) -> tuple[FeatureValue, ...]:
-        """All values of the feature `name`, in the order given."""
-        return tuple(value for known, value in self.features if known == name)
-
-    def value(self, name: str) -> FeatureValue | None:
-        """The first value of the feature `name`, or None."""
-        return next(iter(self.values(name)), None)
-
 
 _MADE: Mapping[type, str] = MappingProxyType(
     {
@@ -179,7 +188,7 @@ class PartialEvent:
         )
 
 
-class StoredEvent:
+class StoredEvent(_Described):
     """An event as a memory holds it, with what the memory added; immutable.
 
     Attributes of `Event`, and `id` (integer, in order of commit), `recorded_at` (when the memory learned
@@ -254,19 +263,6 @@ class StoredEvent:
 
     def __setattr__(self, name: str, value: object) -> None:
         raise AttributeError(f"a StoredEvent is immutable: {name!r} cannot be set")
-
-    @property
-    def is_complex(self) -> bool:
-        """Whether the event has sub-events (Def 6)."""
-        return bool(self.parts)
-
-    def values(self, name: str) -> tuple[FeatureValue, ...]:
-        """All values of the feature `name`, in the order given at birth."""
-        return tuple(value for known, value in self.features if known == name)
-
-    def value(self, name: str) -> FeatureValue | None:
-        """The first value of the feature `name`, or None."""
-        return next(iter(self.values(name)), None)
 
     def as_event(self) -> Event:
         """The event as it stands now, fit to be committed to another memory.

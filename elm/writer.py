@@ -8,6 +8,7 @@ from datetime import datetime
 from uuid import UUID
 
 from elm.arguments import as_count, as_uid_or_id, check_callable, check_several
+from elm.chunks import CHUNK_BYTES
 from elm.errors import InvalidValue, UnknownEvent
 from elm.event import Event, StoredEvent
 from elm.interval import as_utc
@@ -18,8 +19,6 @@ from elm.tombstone import RunTombstone, Tombstone
 
 LOAD_BATCH = 5_000
 """Events of a load that are kept in one transaction."""
-BATCH_BYTES = 64 * 1024 * 1024
-"""Bytes of payload after which a batch is not filled further: it is in memory as a whole."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -120,7 +119,7 @@ def _batches(events: Iterable[Event | StoredEvent | Arrival | Waiting], size: in
             arrival = _to_load(given)
             chunk.append(arrival)
             held += len(arrival.event.payload.data) if arrival.event.payload else 0
-            if len(chunk) < size and held < BATCH_BYTES:
+            if len(chunk) < size and held < CHUNK_BYTES:
                 continue
         if chunk:
             yield chunk
