@@ -16,8 +16,8 @@ from armem_bridge.working.snapshot import Snapshot, supersedes
 class SortedHistory:
     """A `History` in main memory.
 
-    Reading several snapshots takes the lock for as long as references are copied; `at` and `usage` look one up,
-    and take none. `put`, `clear`, `note_use` and `held` are called by who holds the lock already.
+    Reading takes the lock for as long as references are copied; `at` only where it finds nothing without, `usage`
+    never. `put`, `clear`, `note_use` and `held` are called by who holds the lock already.
     """
 
     def __init__(self, lock: Lock, limit: int | None) -> None:
@@ -109,6 +109,10 @@ class SortedHistory:
     def at(self, moment: int) -> Snapshot | None:
         """The snapshot with exactly this reference time."""
         found: Snapshot | None = self._snapshots.get(moment)
+        if found is None:
+            # It may be leaving just now: nobody is told that it is not here before the archive has it.
+            with self._lock:
+                found = self._snapshots.get(moment)
         return found
 
     def index_range(self, first: int, last: int) -> Sequence[Snapshot]:

@@ -37,7 +37,7 @@ class UnionSource:
 
     def history(self, entity: MemoryID) -> History:
         """The snapshots of an entity in all sources; of several versions of one that which counts."""
-        return _UnionHistory([source.history(entity) for source in self._sources])
+        return _UnionHistory(self._sources, entity)
 
 
 class _UnionHistory:
@@ -45,10 +45,13 @@ class _UnionHistory:
 
     The last n of a union are among the last n of each history, and so for the first n: nobody has to
     give more than the query asks for, but for an index range from the front to the back.
+
+    A source is not asked for its history before the sources ahead of it have answered: it may copy then what it has.
     """
 
-    def __init__(self, histories: Sequence[History]) -> None:
-        self._histories = histories
+    def __init__(self, sources: Sequence[Source], entity: MemoryID) -> None:
+        self._sources = sources
+        self._entity = entity
 
     def all(self) -> Sequence[Snapshot]:
         return self._merged(lambda history: history.all())
@@ -67,11 +70,11 @@ class _UnionHistory:
         return self._merged(lambda history: history.between(begin, end))
 
     def at(self, moment: int) -> Snapshot | None:
-        found = [history.at(moment) for history in self._histories]
+        found = [source.history(self._entity).at(moment) for source in self._sources]
         return next(iter(what_counts(each for each in found if each is not None)), None)
 
     def index_range(self, first: int, last: int) -> Sequence[Snapshot]:
         return read_index_range(self, first, last)
 
     def _merged(self, ask: Callable[[History], Sequence[Snapshot]]) -> list[Snapshot]:
-        return what_counts(snapshot for history in self._histories for snapshot in ask(history))
+        return what_counts(snapshot for source in self._sources for snapshot in ask(source.history(self._entity)))

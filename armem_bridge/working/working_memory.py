@@ -149,7 +149,11 @@ class WorkingMemory:
     def knows(self, name: MemoryID) -> bool:
         """Whether there is such a core segment, provider segment or entity."""
         if name.entity:
-            return self._history(name) is not None
+            if self._history(name) is not None:
+                return True
+            # It may be leaving just now: nobody is told that it is not here before the archive has it.
+            with self.lock:
+                return self._history(name) is not None
         if name.provider_segment:
             return self.provider(name.core_segment, name.provider_segment) is not None
         return name.core_segment in self._cores

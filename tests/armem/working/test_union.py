@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Sequence
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from armem_bridge.memory_id import MemoryID
-from armem_bridge.working import Query, QueryTarget, Snapshot
+from armem_bridge.working import AddSegment, Evicted, Query, QueryTarget, Snapshot
 from armem_bridge.working.evaluation import evaluate
 from armem_bridge.working.query import (
     AllSnapshots,
@@ -162,3 +164,111 @@ def test_what_moves_while_a_query_runs_is_not_missed() -> None:
 
     assert found == [1]
     assert moments(server.query(about_the_cup(AllSnapshots()))) == [2]
+
+
+class _Leaving(NaiveHistory):
+    """Lets go of everything just before it answers, as working memory does when the limit drops a snapshot then."""
+
+    def __init__(self, history: list[Snapshot], archived: list[Snapshot]) -> None:
+        super().__init__(history)
+        self._archived = archived
+
+    def all(self) -> Sequence[Snapshot]:
+        self._archived += self.h
+        self.h.clear()
+        return []
+
+    def latest(self, count: int) -> Sequence[Snapshot]:
+        return self.all()
+
+    def before(self, moment: int, count: int) -> Sequence[Snapshot]:
+        return self.all()
+
+    def after(self, moment: int, count: int) -> Sequence[Snapshot]:
+        return self.all()
+
+    def between(self, begin: int, end: int) -> Sequence[Snapshot]:
+        return self.all()
+
+    def at(self, moment: int) -> Snapshot | None:
+        return next(iter(self.all()), None)
+
+    def index_range(self, first: int, last: int) -> Sequence[Snapshot]:
+        return self.all()
+
+
+class _Emptying(NaiveSource):
+    def __init__(self, archived: list[Snapshot]) -> None:
+        super().__init__([snapshot(1)])
+        self._archived = archived
+
+    def history(self, entity: MemoryID) -> NaiveHistory:
+        return _Leaving(super().history(entity).h, self._archived)
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [
+        AllSnapshots(),
+        LatestSnapshots(count=1),
+        SingleSnapshot(timestamp=1),
+        IndexRange(first=0, last=0),
+        BeforeTime(timestamp=2, max_entries=1),
+        AtOrBefore(timestamp=1),
+        TimeRange(min_timestamp=0, max_timestamp=5),
+        Approximate(timestamp=1, eps=1),
+    ],
+    ids=lambda asked: type(asked).__name__,
+)
+def test_what_leaves_before_the_first_source_answers_is_not_missed(asked: SnapshotQuery) -> None:
+    archived: list[Snapshot] = []
+    source = UnionSource(_Emptying(archived), UnionSource(NaiveSource(archived)))
+
+    assert moments(evaluate(about_the_cup(asked), source, "Object")) == [1]
+
+
+class Hesitating(ListArchive):
+    """An archive that is handed what leaves working memory, and takes it when it is let to."""
+
+    def __init__(self) -> None:
+        super().__init__(on_eviction_only=True)
+        self.entered, self.go_on = threading.Event(), threading.Event()
+
+    def on_eviction(self, evicted: Sequence[Evicted]) -> None:
+        self.entered.set()
+        assert self.go_on.wait(30)
+        super().on_eviction(evicted)
+
+
+@pytest.mark.parametrize("leaving", ["by the limit", "by clearing"])
+@pytest.mark.parametrize("asked", ["get", SingleSnapshot(timestamp=1), AllSnapshots()], ids=["get", "single", "all"])
+def test_what_is_leaving_is_not_missed(leaving: str, asked: str | SnapshotQuery) -> None:
+    archive = Hesitating()
+    server = object_memory(archive=archive, limits={CUP: 1})
+    commit(server, update(1))
+    clear = AddSegment(core_segment="Instance", provider_segment="ObjectLocalizer", clear_when_exists=True)
+    found: list[int] = []
+
+    def leave() -> None:
+        if leaving == "by the limit":
+            commit(server, update(2))
+        else:
+            server.add_segments([clear])
+
+    def look() -> None:
+        if isinstance(asked, str):
+            known = server.get(CUP.with_timestamp(1), target=QueryTarget.BOTH)
+            found.extend([] if known is None else [known.referenced])
+        else:
+            found.extend(moments(server.query(replace(about_the_cup(asked), target=QueryTarget.BOTH))))
+
+    leaver, looker = threading.Thread(target=leave), threading.Thread(target=look)
+    leaver.start()
+    assert archive.entered.wait(30)
+    looker.start()
+    # Whoever looks now must wait for the archive; one that does not is over by then, and has missed it.
+    looker.join(0.2)
+    archive.go_on.set()
+    leaver.join(30)
+    looker.join(30)
+    assert 1 in found
