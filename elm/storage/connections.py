@@ -8,7 +8,7 @@ import select
 import time
 import weakref
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from functools import wraps
 from threading import RLock
@@ -21,6 +21,7 @@ from psycopg.types.string import ByteaBinaryLoader
 
 from elm.errors import DatabaseUnfit, DatabaseUnreachable, ElmError, MemoryMissing, StoreClosed, StoreFailure
 from elm.storage import forking
+from elm.storage.planning import SESSION, WRITING, Planning
 from elm.storage.unreachable import unreachable
 
 Connection = psycopg.Connection[Any]
@@ -29,26 +30,6 @@ _T = TypeVar("_T")
 
 MINIMUM_SERVER = 14
 """The oldest PostgreSQL that has multiranges, from which the span of a complex event is derived."""
-
-_SESSION = {
-    "TimeZone": "UTC",
-    "jit": "off",
-    "random_page_cost": "1.1",
-    # The locks that writers take are only right where each statement sees what was committed before it.
-    "default_transaction_isolation": "read committed",
-    "work_mem": "64MB",
-}
-# The write statements are always the same plan; finding it anew would cost more than running it.
-WRITING = {"plan_cache_mode": "force_generic_plan"}
-# A recall's best plan depends on the cue's values, and starting parallel workers costs more than they save.
-# What is read by a cursor is read to its end.
-RECALLING = {
-    "plan_cache_mode": "force_custom_plan",
-    "max_parallel_workers_per_gather": "0",
-    "cursor_tuple_fraction": "1",
-}
-# But for events asked for one by one there is one good plan, and to make it anew costs more than to run it.
-NAMING = {**RECALLING, "plan_cache_mode": "force_generic_plan"}
 
 # Decoded by elm, when somebody looks: until then the bytes as they came.
 _RAW_OIDS = (
@@ -121,7 +102,7 @@ def _translate(error: psycopg.Error, memory: str) -> ElmError:
             )
 
 
-def open_connection(dsn: str, settings: dict[str, str], *, memory: str | None = None) -> Connection:
+def open_connection(dsn: str, settings: Mapping[str, str], *, memory: str | None = None) -> Connection:
     """A connection in autocommit mode whose search_path leads into `memory`."""
     try:
         check_password(dsn)
@@ -143,7 +124,7 @@ def open_connection(dsn: str, settings: dict[str, str], *, memory: str | None = 
     return connection
 
 
-def _set_up(connection: Connection, settings: dict[str, str], memory: str | None) -> None:
+def _set_up(connection: Connection, settings: Mapping[str, str], memory: str | None) -> None:
     if connection.info.server_version < MINIMUM_SERVER * 10_000:
         version = connection.info.parameter_status("server_version")
         raise DatabaseUnfit(f"PostgreSQL {version} is too old: elm needs {MINIMUM_SERVER} or newer")
@@ -161,7 +142,7 @@ def _set_up(connection: Connection, settings: dict[str, str], memory: str | None
         path = [sql.Identifier(name) for name in (memory, row[0] if row else None) if name]
         chosen = [
             sql.SQL("SET {} = {}").format(sql.Identifier(name), sql.Literal(value))
-            for name, value in {**_SESSION, **settings}.items()
+            for name, value in {**SESSION, **settings}.items()
         ]
         if path:
             chosen.append(sql.SQL("SET search_path = {}").format(sql.SQL(", ").join(path)))
@@ -200,8 +181,7 @@ class Connections:
         # Both are reentrant: the garbage collector lets go of results that nobody reads on, and a signal's handler
         # closes, amid whatever this thread was doing.
         self._lock = RLock()
-        self._idle: deque[Connection] = deque()
-        self._idle_named: deque[Connection] = deque()
+        self._idle: dict[Planning, deque[Connection]] = {planning: deque() for planning in Planning}
         self._writing: Connection | None = None
         self._write_lock = RLock()
         self._opened: WeakSet[Connection] = WeakSet()
@@ -212,12 +192,11 @@ class Connections:
     def begin_anew(self) -> None:
         """Have no connection yet, and locks that nobody holds: those of another process were not meant for this."""
         self._lock, self._write_lock = RLock(), RLock()
-        self._idle.clear()
-        self._idle_named.clear()
+        self._idle = {planning: deque() for planning in Planning}
         self._writing = None
         self._opened.clear()
 
-    def _open(self, settings: dict[str, str]) -> Connection:
+    def _open(self, settings: Mapping[str, str]) -> Connection:
         connection = open_connection(self._dsn, settings, memory=self._memory)
         self._opened.add(connection)
         return connection
@@ -236,17 +215,14 @@ class Connections:
                 yield self._writing
 
     @contextmanager
-    def recalling(self, *, named: bool = False) -> Iterator[Connection]:
-        """A connection to recall with, to one caller at a time; handed on when the caller is done.
-
-        One for `named` events plans a prepared statement once, whatever its values.
-        """
-        idle = self._idle_named if named else self._idle
+    def recalling(self, planning: Planning = Planning.ANEW) -> Iterator[Connection]:
+        """A connection to recall with, to one caller at a time; handed on when the caller is done."""
+        idle = self._idle[planning]
         with self._lock:
             self.check_open()
             connection = idle.pop() if idle else None
         if connection is None or _is_lost(connection):
-            connection = self._open(NAMING if named else RECALLING)
+            connection = self._open(planning.value)
         try:
             with translated(self._memory):
                 yield connection
@@ -271,7 +247,7 @@ class Connections:
         """
         with self._lock:
             self._closed = True
-            for idle in (self._idle, self._idle_named):
+            for idle in self._idle.values():
                 while idle:
                     idle.pop().close()
         with self._write_lock:

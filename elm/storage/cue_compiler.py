@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any, assert_never
 
 from sqlalchemy import (
@@ -17,6 +18,7 @@ from sqlalchemy import (
     bindparam,
     false,
     func,
+    null,
     or_,
     select,
     true,
@@ -42,7 +44,7 @@ from elm.cues.algebra import (
 )
 from elm.cues.relations import TypeRelation
 from elm.storage.conditions.kin import kin
-from elm.storage.conditions.rule import UIDS, Bind, Names, Rule, SqlCondition, indexed
+from elm.storage.conditions.rule import UIDS, Bind, Names, Rule, SqlCondition, exactly, indexed
 from elm.storage.conditions.what import feature, feature_names, features
 from elm.storage.conditions.when import duration, time
 from elm.storage.conditions.where import region
@@ -63,6 +65,12 @@ class CompiledCue:
     """Something cheap that all fulfil that match, to be asked first of rows that no index chose."""
     narrow: Callable[[FromClause], SqlCondition] | None
     """What all fulfil that match, as an index understands it that knows begins too; None without one."""
+    outline: Callable[[FromClause], SqlCondition] | None
+    """The same with boxes in place of polygons, all that match and others; None where there is no polygon."""
+    looks: tuple[Callable[[FromClause], SqlCondition], ...]
+    """What each index finds that serves the cue whatever its values: all that match, and perhaps others."""
+    judge: Callable[[FromClause], SqlCondition]
+    """The condition, as a plan that does not know the values judges a row as fast."""
 
 
 def compile_cue(cue: Cue, names: Names, *, prefix: str = "p") -> CompiledCue:
@@ -87,6 +95,9 @@ def compile_cue(cue: Cue, names: Names, *, prefix: str = "p") -> CompiledCue:
         is_search=rule.is_search,
         glimpse=bound_if_any(rule.glimpse),
         narrow=bound_if_any(rule.narrow),
+        outline=bound_if_any(rule.outline),
+        looks=tuple(map(bound, rule.looks)),
+        judge=bound(rule.judge or rule.build),
     )
 
 
@@ -103,6 +114,7 @@ def _rule(cue: Cue, names: Names) -> Rule:
                 key=("not", inner.key),
                 values=inner.values,
                 build=lambda e, *p: inner.build(e, *p).is_not(true()),
+                judge=lambda e, *p: (inner.judge or inner.build)(e, *p).is_not(true()),
             )
         case TypeCue() as condition:
             return _type(condition, names)
@@ -122,15 +134,25 @@ def _rule(cue: Cue, names: Names) -> Rule:
                 ("payload",),
                 ((data, LargeBinary()),),
                 lambda e, p: and_(func.sha256(e.c.payload) == func.sha256(p), e.c.payload == p),
+                look=lambda e, p: exactly(func.sha256(e.c.payload), func.sha256(p)),
             )
         case AgentCue(agent=agent):
-            return indexed(("agent",), ((agent, Text()),), lambda e, p: e.c.agent == p)
+            return indexed(
+                ("agent",),
+                ((agent, Text()),),
+                lambda e, p: e.c.agent == p,
+                look=lambda e, p: exactly(e.c.agent, p),
+            )
         case DurationCue() as condition:
             return duration(condition)
         case KinCue() as condition:
             return kin(condition)
         case UidCue(uids=uids):
-            return indexed(("uid",), ((list(uids), UIDS),), lambda e, p: e.c.uid == any_(p))
+
+            def among(e: FromClause, p: Bind) -> SqlCondition:
+                return e.c.uid == any_(p)
+
+            return indexed(("uid",), ((list(uids), UIDS),), among, look=among)
         case unknown:
             assert_never(unknown)
 
@@ -157,6 +179,7 @@ def _combined(op: str, args: Sequence[Cue], names: Names) -> Rule:
     def build(e: FromClause, *binds: Bind) -> SqlCondition:
         return joined(e, binds, [rule.build for rule in rules])
 
+    has_outline = any(rule.outline is not None for rule in rules)
     return Rule(
         key=(op, *(rule.key for rule in rules)),
         values=values,
@@ -164,7 +187,24 @@ def _combined(op: str, args: Sequence[Cue], names: Names) -> Rule:
         search=build if rules and all(rule.is_search for rule in rules) else combined([rule.search for rule in rules]),
         glimpse=combined([rule.glimpse for rule in rules]),
         narrow=combined([rule.narrow for rule in rules]),
+        outline=combined([rule.outline or rule.build for rule in rules]) if has_outline else None,
+        looks=tuple(islice(_looks(rules), _MOST_LOOKS)) if op == "and" else (),
+        judge=combined([rule.judge or rule.build for rule in rules]),
     )
+
+
+_MOST_LOOKS = 8
+"""Conditions of a cue that are looked at by their indexes, one after the other."""
+
+
+def _looks(rules: Sequence[Rule]) -> Iterator[Callable[..., SqlCondition]]:
+    """The looks of all rules that hold together, each of which takes the parameters of all."""
+    first = 0
+    for rule in rules:
+        own = slice(first, first + len(rule.values))
+        for look in rule.looks:
+            yield lambda e, *binds, look=look, own=own: look(e, *binds[own])
+        first = own.stop
 
 
 def _take(binds: Iterator[Bind], count: int) -> list[Bind]:
@@ -176,10 +216,13 @@ def _type(cue: TypeCue, names: Names) -> Rule:
     match cue.relation:
         case TypeRelation.EXACTLY:
 
-            def exactly(e: FromClause, p: Bind) -> SqlCondition:
+            def same(e: FromClause, p: Bind) -> SqlCondition:
                 return e.c.type_id == p
 
-            return Rule(key=("type", "exactly"), values=values, build=exactly, search=exactly, narrow=exactly)
+            def look(e: FromClause, p: Bind) -> SqlCondition:
+                return exactly(e.c.type_id, p)
+
+            return Rule(key=("type", "exactly"), values=values, build=same, search=same, narrow=same, looks=(look,))
         case TypeRelation.IS_A:
 
             def is_a(e: FromClause, p: Bind) -> SqlCondition:
@@ -190,7 +233,12 @@ def _type(cue: TypeCue, names: Names) -> Rule:
                 # But between two begins this is one probe for each type, where that is a join with all in between.
                 return e.c.type_id == any_(func.array(_below(p).scalar_subquery()))
 
-            return Rule(key=("type", "is_a"), values=values, build=is_a, search=is_a, narrow=narrow)
+            def judge(e: FromClause, p: Bind) -> SqlCondition:
+                # And for a row by itself one probe, where a plan for any type might gather all that are below it.
+                below = _below(p).where(type_closure.c.descendant_id == e.c.type_id).correlate(e)
+                return below.scalar_subquery().is_not(null())
+
+            return Rule(key=("type", "is_a"), values=values, build=is_a, search=is_a, narrow=narrow, judge=judge)
         case unknown:
             assert_never(unknown)
 

@@ -9,7 +9,8 @@ import psycopg
 
 from elm.errors import DatabaseUnreachable, ElmError
 from elm.storage import IN_PROCESS, resolve_dsn, schema
-from elm.storage.connections import RECALLING, Connection, check_password, open_connection
+from elm.storage.connections import Connection, check_password, open_connection
+from elm.storage.planning import RECALLING
 from elm.storage.tables import REVISION
 
 _SETTINGS = """

@@ -5,7 +5,7 @@ from __future__ import annotations
 from elm.cues.algebra import And, Cue, DurationCue, KinCue, PayloadCue, TimeCue, TypeCue, UidCue
 from elm.cues.relations import SetRelation, TimeAxis, TypeRelation
 from elm.interval import AllenRelation, Window
-from elm.query import Query
+from elm.query import Nearest, Query
 
 
 def of_query(query: Query) -> tuple[bool, Window]:
@@ -31,9 +31,10 @@ def is_pinned(cue: Cue) -> bool:
             return False
 
 
-def is_named(cue: Cue) -> bool:
-    """Whether that is all the cue says: then one plan is good for whatever is named."""
-    return not isinstance(cue, And) and is_pinned(cue)
+def is_planned_once(query: Query) -> bool:
+    """Whether a query's cue says nothing more than that: then one plan is good for whatever is named."""
+    is_named = not isinstance(query.cue, And) and is_pinned(query.cue)
+    return is_named and not isinstance(query.order, Nearest)
 
 
 def is_guess(cue: Cue) -> bool:

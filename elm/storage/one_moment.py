@@ -12,6 +12,7 @@ from elm.event import StoredEvent
 from elm.query import Order, Query
 from elm.storage import recall_statements, tombstone_rows
 from elm.storage.connections import Connection
+from elm.storage.planning import Planning
 from elm.storage.session import Session
 from elm.tombstone import RunTombstone, Tombstone
 
@@ -27,7 +28,7 @@ def one_moment(session: Session) -> Iterator[Connection]:
     """A connection all of whose statements see the memory as of the first of them."""
     session.ready_to_recall()
     # Named: what is asked piece by piece is planned once. A cursor's plan is made for its values all the same.
-    with session.connections.recalling(named=True) as connection, connection.transaction():
+    with session.connections.recalling(Planning.ONCE) as connection, connection.transaction():
         connection.execute("SET TRANSACTION ISOLATION LEVEL REPEATABLE READ, READ ONLY")
         yield connection
 

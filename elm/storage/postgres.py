@@ -1,4 +1,4 @@
-"""A memory in PostgreSQL with PostGIS: one schema, every call one transaction, every cue one statement."""
+"""A memory in PostgreSQL with PostGIS: one schema, every call one transaction, every answer one statement."""
 
 from __future__ import annotations
 
@@ -12,16 +12,24 @@ from uuid import UUID
 import psycopg
 
 from elm.cues.algebra import Cue
-from elm.cues.codec import cue_to_json
 from elm.errors import MemoryMissing
 from elm.event import StoredEvent
-from elm.exchange import to_line
-from elm.query import MOST_ID, ByFeature, ConditionRows, Explanation, Group, Grouping, Join, Nearest, Query
-from elm.storage import batch_loading, event_writing, grouping, hints, recall_statements, type_writing
+from elm.query import MOST_ID, ByFeature, Explanation, Group, Grouping, Join, Query
+from elm.storage import (
+    batch_loading,
+    event_writing,
+    grouping,
+    hints,
+    recall_statements,
+    type_writing,
+)
 from elm.storage import write_statements as sql
 from elm.storage.batch import made_ready
 from elm.storage.connections import Connection, repeated
+from elm.storage.explaining import explain
+from elm.storage.first_look import AT_ONCE
 from elm.storage.one_moment import by_ids, everything, one_moment, pieces, with_parts
+from elm.storage.planning import Planning
 from elm.storage.postgres_forgetting import PostgresForgetting
 from elm.storage.postgres_log import PostgresLog
 from elm.storage.rows import moment
@@ -31,8 +39,6 @@ from elm.store import Arrival, BatchReport, Closed, Committed, Statistics, Types
 from elm.taxonomy import EventType
 from elm.tombstone import RunTombstone, Tombstone
 
-CHUNK = 100
-"""Rows that a streamed result holds in this process at a time: their payloads may be images."""
 _CHUNKED = psycopg.capabilities.has_stream_chunked()
 
 
@@ -126,11 +132,23 @@ class PostgresStore(PostgresForgetting):
 
     def find(self, query: Query) -> Iterator[StoredEvent]:
         """The events a query asks for, streamed from one consistent view."""
-        text, values = self._session.asked("find", query, recall_statements.find)
-        named = hints.is_named(query.cue) and not isinstance(query.order, Nearest)
-        if named or hints.is_pinned(query.cue) or (query.limit is not None and query.limit <= CHUNK):
-            return self._events(text, values, named=named)
-        return self._streamed_events(text, values)
+        if hints.is_planned_once(query):
+            text, values = self._session.asked("find", query, recall_statements.find)
+            return self._events(text, values, Planning.ONCE)
+        return self._found(query)
+
+    def _found(self, query: Query) -> Iterator[StoredEvent]:
+        looked = self._session.look("find", query, recall_statements.columns)
+        if looked is not None:
+            self._session.learn(looked.rows)
+            decode = self._session.decode
+            yield from (StoredEvent.of_row(row, decode) for row in looked.rows)
+            return
+        text, values = self._session.asked("find", query, recall_statements.find, looked=True)
+        if hints.is_pinned(query.cue) or (query.limit is not None and query.limit <= AT_ONCE):
+            yield from self._events(text, values, Planning.ANEW)
+        else:
+            yield from self._streamed_events(text, values)
 
     def with_parts(self, query: Query) -> Iterator[StoredEvent | Tombstone]:
         """The events a query asks for and all they are made of, by id, after the tombstones of forgotten parts."""
@@ -142,7 +160,11 @@ class PostgresStore(PostgresForgetting):
 
     def ids(self, query: Query) -> Iterator[int]:
         """Their ids alone."""
-        text, values = self._session.asked("ids", query, recall_statements.find_ids)
+        looked = self._session.look("ids", query, recall_statements.only_id)
+        if looked is not None:
+            yield from (row[0] for row in looked.rows)
+            return
+        text, values = self._session.asked("ids", query, recall_statements.find_ids, looked=True)
         with self._connections.recalling() as connection:
             for row in self._stream(connection, text, values):
                 yield row[0]
@@ -164,7 +186,7 @@ class PostgresStore(PostgresForgetting):
         self._session.ready_to_recall()
         text = self._session.statements.text("by id", recall_statements.by_ids)
         possible = [number for number in ids if 0 < number <= MOST_ID]
-        return list(self._events(text, {"ids": possible}, named=True))
+        return list(self._events(text, {"ids": possible}, Planning.ONCE))
 
     def groups(self, cue: Cue, by: Grouping | ByFeature) -> list[Group]:
         """The matching events by key, keys in ascending order, None last."""
@@ -193,35 +215,15 @@ class PostgresStore(PostgresForgetting):
         own = recall_statements.parameters(join.anchors, near=near)
         values = {**anchors.values, **other.values, **own}
         with one_moment(self._session) as connection:
-            for pairs in pieces(connection, text, values, size=CHUNK):
+            for pairs in pieces(connection, text, values, size=AT_ONCE):
                 wanted = {number for pair in pairs for number in pair if number is not None}
                 known = {event.id: event for event in by_ids(self._session, connection, sorted(wanted))}
                 for anchor, neighbour in pairs:
                     yield known[anchor], known[neighbour] if neighbour is not None else None
 
     def explain(self, query: Query) -> Explanation:
-        """How the query is answered; it is run for that."""
-        text, values = self._session.asked("find", query, recall_statements.find)
-        parts = hints.conjuncts(query.cue)
-        compiled = [self._session.compiled(part, prefix=f"c{index}_") for index, part in enumerate(parts)]
-        removed = str(recall_statements.removed(compiled).compile(dialect=recall_statements.DIALECT))
-        with self._connections.recalling() as connection:
-            plan = connection.execute(f"EXPLAIN (ANALYZE, BUFFERS) {text}", values).fetchall()
-            given = {name: value for each in compiled for name, value in each.values.items()}
-            counts = connection.execute(removed, given).fetchone()
-        assert counts is not None  # noqa: S101 - a count always has a row
-        return Explanation(
-            sql=text,
-            parameters=values,
-            plan="\n".join(line for (line,) in plan),
-            events=counts[0],
-            conditions=tuple(
-                ConditionRows(
-                    condition=to_line(cue_to_json(part)), alone=counts[1 + 2 * index], left=counts[2 + 2 * index]
-                )
-                for index, part in enumerate(parts)
-            ),
-        )
+        """How the query is answered, by the statement that does it in the end; it is run for that."""
+        return explain(self._session, query)
 
     def arrow(self, query: Query) -> Any:
         """The events as a pyarrow.RecordBatchReader in the schema of `elm.columns`."""
@@ -265,10 +267,11 @@ class PostgresStore(PostgresForgetting):
 
     # How statements are run
 
-    def _events(self, text: str, values: dict[str, Any], *, named: bool) -> Iterator[StoredEvent]:
-        """A few events, fetched at once; named ones by a prepared statement, which is planned once."""
-        with self._connections.recalling(named=named) as connection:
-            rows = connection.execute(text, values, prepare=named or None, binary=True).fetchall()
+    def _events(self, text: str, values: dict[str, Any], planning: Planning) -> Iterator[StoredEvent]:
+        """A few events, fetched at once."""
+        with self._connections.recalling(planning) as connection:
+            prepare = None if planning is Planning.ANEW else True
+            rows = connection.execute(text, values, prepare=prepare, binary=True).fetchall()
             self._session.learn(rows, connection)
         decode = self._session.decode
         for row in rows:
@@ -278,13 +281,13 @@ class PostgresStore(PostgresForgetting):
         decode = self._session.decode
         with self._connections.recalling() as connection:
             stream = self._stream(connection, text, values)
-            while chunk := list(islice(stream, CHUNK)):
+            while chunk := list(islice(stream, AT_ONCE)):
                 self._session.learn(chunk)
                 for row in chunk:
                     yield StoredEvent.of_row(row, decode)
 
     def _stream(self, connection: Connection, text: str, values: dict[str, Any]) -> Iterator[Sequence[Any]]:
-        size = CHUNK if _CHUNKED else 1
+        size = AT_ONCE if _CHUNKED else 1
         return connection.cursor().stream(text, values, binary=True, size=size)
 
     def _all(self, text: str, values: dict[str, Any]) -> list[Any]:

@@ -106,12 +106,17 @@ def columns(e: FromClause) -> list[ColumnElement[Any]]:
     return [values[each] for each in Column]
 
 
+def only_id(e: FromClause) -> list[ColumnElement[Any]]:
+    """The id alone."""
+    return [e.c.id]
+
+
 # Which events, in which order
 
 
-def find(compiled: CompiledCue, query: Query, *, pinned: bool, near: Window) -> Select[Any]:
-    """The rows a query asks for, in order."""
-    found = found_rows(compiled, query, pinned=pinned, near=near)
+def find(compiled: CompiledCue, query: Query, *, pinned: bool, near: Window, looked: bool = False) -> Select[Any]:
+    """The rows a query asks for, in order; `looked` where a first look did not answer it."""
+    found = found_rows(compiled, query, pinned=pinned, near=near, looked=looked)
     if found is None:
         return ordered(select(*columns(event)).where(*conditions(compiled, query, event)), query)
     # OFFSET 0 keeps the planner from joining in another way: what it takes for the cost of `found` may be far off.
@@ -119,9 +124,9 @@ def find(compiled: CompiledCue, query: Query, *, pinned: bool, near: Window) -> 
     return select(*columns(there)).select_from(found.join(there, true())).order_by(*keys(query, found))
 
 
-def find_ids(compiled: CompiledCue, query: Query, *, pinned: bool, near: Window) -> Select[Any]:
+def find_ids(compiled: CompiledCue, query: Query, *, pinned: bool, near: Window, looked: bool = False) -> Select[Any]:
     """Their ids alone, in order."""
-    found = found_rows(compiled, query, pinned=pinned, near=near)
+    found = found_rows(compiled, query, pinned=pinned, near=near, looked=looked)
     if found is None:
         return ordered(select(event.c.id).where(*conditions(compiled, query, event)), query)
     return select(found.c.id).order_by(*keys(query, found))

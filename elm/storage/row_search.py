@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from geoalchemy2 import Geometry
@@ -20,8 +20,10 @@ from sqlalchemy import (
     case,
     extract,
     func,
+    lateral,
     literal_column,
     select,
+    true,
     tuple_,
     union_all,
 )
@@ -53,10 +55,13 @@ def row(e: FromClause) -> ColumnElement[Any]:
     return literal_column(f"{e.name}.ctid")  # type: ignore[attr-defined]
 
 
-def found_rows(compiled: CompiledCue, query: Query, *, pinned: bool, near: Window) -> Any:
-    """Where the rows of an answer stand, in order, if it pays to find that first; None where one plain scan does."""
+def found_rows(compiled: CompiledCue, query: Query, *, pinned: bool, near: Window, looked: bool = False) -> Any:
+    """Where the rows of an answer stand, in order, if it pays to find that first; None where one plain scan does.
+
+    With `looked` it is known that neither a few match nor most (`elm.storage.first_look`).
+    """
     if walks(query, pinned=pinned):
-        return _first(compiled, query, near)
+        return _first(compiled, query, near, looked=looked)
     if isinstance(query.order, Nearest):
         # Of a cue that few match the index by distance would be walked to its end: then candidates are collected.
         return _nearest(compiled, query) if query.limit is not None and query.cue == And() else None
@@ -72,9 +77,9 @@ def _nearest(compiled: CompiledCue, query: Query) -> Any:
     right in order, PostgreSQL gives the ctid of another row.
     """
     distance, _ = order(query)
-    place = [distance.label("distance"), event.c.id]
     limit = bindparam("limit", type_=BigInteger)
-    ties = select(*place).where(*conditions(compiled, query, event)).order_by(distance).fetch(limit, with_ties=True)
+    standing_at = select(distance.label("distance"), event.c.id).where(*conditions(compiled, query, event))
+    ties = standing_at.order_by(distance).fetch(limit, with_ties=True)
     near = ties.subquery("ties")
     first = select(near).order_by(*keys(query, near)).limit(limit).subquery("first")
     standing = event.alias("standing")
@@ -103,7 +108,7 @@ def walks(query: Query, *, pinned: bool) -> bool:
     return not isinstance(query.order, Nearest)
 
 
-def _first(compiled: CompiledCue, query: Query, near: Window) -> Any:
+def _first(compiled: CompiledCue, query: Query, near: Window, *, looked: bool) -> Any:
     """Where the rows of a limited answer are, at a cost bounded by its hits, however the cue correlates with time.
 
     The planner takes a cue's hits to be spread evenly over time; where they are not, it walks the begin
@@ -114,32 +119,33 @@ def _first(compiled: CompiledCue, query: Query, near: Window) -> Any:
     limit = bindparam("limit", type_=BigInteger)
     steps: list[Select[Any]] = []
     unsolved: list[SqlCondition] = []
-    if compiled.search is not None:
-        glance = _walked(compiled, query, near, "glance", [])
-        short = _count(glance) < limit
+    if compiled.search is not None and not looked:
+        glance = walked(compiled, query, near, "glance", [])
+        short = counted(glance) < limit
         most = bindparam("handful", type_=BigInteger)
         handful = _searched(compiled, compiled.search, query, short, most)
-        too_many = _count(handful) > most
+        too_many = counted(handful) > most
         all_of_them = select(handful.c.row, handful.c.begin, handful.c.id).where(~too_many)
         if not compiled.is_search:
             all_of_them = all_of_them.where(compiled.condition(handful))
         steps += [select(glance).where(~short), all_of_them]
         unsolved.append(too_many)
-    walk = _walked(compiled, query, near, "walk", unsolved)
-    filled = _count(walk) >= limit
+    walk = walked(compiled, query, near, "walk", unsolved)
+    filled = counted(walk) >= limit
     steps.append(select(walk).where(filled))
     unsolved.append(~filled)
     if compiled.search is not None and query.order is not Order.ID:
         stretch = _stretch(compiled, query, walk, limit, unsolved)
-        filled = _count(stretch) >= limit
+        filled = counted(stretch) >= limit
         steps.append(select(stretch).where(filled))
         unsolved.append(~filled)
-    steps.append(_collected(compiled, query, unsolved))
+    last = _collected if compiled.outline is None else _judged_in_order
+    steps.append(last(compiled, query, unsolved))
     found = union_all(*steps).subquery("found")
     return select(found).order_by(*keys(query, found)).limit(limit).subquery("ids")
 
 
-def _walked(compiled: CompiledCue, query: Query, near: Window, name: str, when: list[SqlCondition]) -> Any:
+def walked(compiled: CompiledCue, query: Query, near: Window, name: str, when: Sequence[SqlCondition]) -> Any:
     """What matches among the next rows in order, of which parameter `name` says how many, up to the limit."""
     bounds: list[SqlCondition] = []
     # Only where the walk goes along the begins do these bound it.
@@ -149,7 +155,7 @@ def _walked(compiled: CompiledCue, query: Query, near: Window, name: str, when: 
     if along_begin and near.end is not None:
         bounds.append(begin(event) <= bindparam("near_end", type_=TIME))
     # The begin as a column: by it the planner knows that the rows are in order, and stops at the limit.
-    rows = select(event, *_place(event)).where(*bounds, *_after(query, event)).order_by(*order(query))
+    rows = select(event, *place(query)).where(*bounds, *_after(query, event)).order_by(*order(query))
     rows_near = rows.limit(bindparam(name, type_=Integer)).subquery("near")
     matching = select(rows_near.c.row, rows_near.c.begin, rows_near.c.id)
     glimpse = [] if compiled.glimpse is None else [compiled.glimpse(rows_near)]
@@ -203,20 +209,42 @@ def _searched(
 ) -> Any:
     """What an index finds for the cue, in no order, and one more than `most` if there are more."""
     wanted = [event.c.id] if compiled.is_search else [event]
-    found = select(*wanted, *_place(event)).where(when, search(event), *_after(query, event))
+    found = select(*wanted, *place(query)).where(when, search(event), *_after(query, event))
     return found.limit(most + literal_column("1")).cte("handful").prefix_with("MATERIALIZED")
 
 
 def _collected(compiled: CompiledCue, query: Query, when: list[SqlCondition]) -> Select[Any]:
-    return select(*_place(event), event.c.id).where(*when, *conditions(compiled, query, event))
+    return select(*place(query), event.c.id).where(*when, *conditions(compiled, query, event))
 
 
-def _count(found: FromClause) -> ColumnElement[Any]:
+def _judged_in_order(compiled: CompiledCue, query: Query, when: list[SqlCondition]) -> Select[Any]:
+    """The first that match of what their boxes let through: no more polygons are judged than it takes."""
+    assert compiled.outline is not None  # noqa: S101 - the caller has looked
+    boxes = select(*place(query), event.c.id).where(*when, compiled.outline(event), *_after(query, event))
+    candidates = boxes.cte("candidates").prefix_with("MATERIALIZED")
+    ordered, there = judged(query, candidates, lambda _: [compiled.condition(event)])
+    found = select(ordered).select_from(ordered.join(there, true())).order_by(*keys(query, ordered))
+    return select(found.limit(bindparam("limit", type_=BigInteger)).subquery("judged"))
+
+
+def judged(
+    query: Query, candidates: FromClause, fulfilled: Callable[[FromClause], list[SqlCondition]]
+) -> tuple[FromClause, Any]:
+    """Candidates in order and, laterally, the event of each that fulfils this: read as far as somebody reads."""
+    ordered = select(candidates).order_by(*keys(query, candidates)).offset(literal_column("0")).subquery("ordered")
+    standing = select(event).where(row(event) == ordered.c.row, *fulfilled(ordered))
+    return ordered, lateral(standing.offset(literal_column("0")), name="there")
+
+
+def counted(found: FromClause) -> ColumnElement[Any]:
+    """How many rows were found."""
     return select(func.count()).select_from(found).scalar_subquery()
 
 
-def _place(e: FromClause) -> tuple[ColumnElement[Any], ColumnElement[Any]]:
-    return row(e).label("row"), begin(e).label("begin")
+def place(query: Query) -> list[ColumnElement[Any]]:
+    """Where an event stands and, but for its id, by what it is sorted."""
+    by = order(query)[0].label("distance") if isinstance(query.order, Nearest) else begin(event).label("begin")
+    return [row(event).label("row"), by]
 
 
 def keys(query: Query, found: FromClause) -> list[ColumnElement[Any]]:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
 from typing import Any
 from uuid import UUID
 
@@ -12,10 +14,11 @@ from elm.cues.algebra import Cue, UidCue
 from elm.errors import InvalidValue
 from elm.event import StoredEvent
 from elm.query import Query
-from elm.storage import forking, hints, recall_statements, schema
+from elm.storage import first_look, forking, hints, recall_statements, schema
 from elm.storage.connections import Connection, Connections
 from elm.storage.cue_compiler import CompiledCue, compile_cue
 from elm.storage.names import NameCache
+from elm.storage.planning import Planning
 from elm.storage.rows import FRAME_ID, SUBJECT_FRAME_ID, TYPE_ID, decoders
 from elm.text import check_memory_name
 
@@ -30,6 +33,16 @@ def check_values(given: int) -> None:
             f"a cue of {given} values is too much for one statement, which takes {MOST_VALUES}: name many events by "
             f"one cue of their uids, which counts as one value, or split the cue and recall by each part"
         )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Looked:
+    """The answer of a first look, and the statement that gave it."""
+
+    text: str
+    values: dict[str, Any]
+    planning: Planning
+    rows: list[Sequence[Any]]
 
 
 class Session:
@@ -84,13 +97,40 @@ class Session:
         check_values(len(compiled.values))
         return compiled
 
-    def asked(self, kind: str, query: Query, build: Callable[..., Select[Any]]) -> tuple[str, dict[str, Any]]:
-        """The statement of its `kind`, as `build` makes it, that answers a query, and its values."""
+    def asked(
+        self, kind: str, query: Query, build: Callable[..., Select[Any]], *, looked: bool = False
+    ) -> tuple[str, dict[str, Any]]:
+        """The statement of its `kind`, as `build` makes it, that answers a query whatever it asks for, and its values.
+
+        With `looked` the query has some first looks, none of which answered it.
+        """
         compiled = self.compiled(query.cue)
         pinned, near = hints.of_query(query)
-        key = (kind, compiled.key, recall_statements.shape(query, pinned=pinned, near=near))
-        text = self.statements.text(key, lambda: build(compiled, query, pinned=pinned, near=near))
+        looked = looked and bool(first_look.looks(compiled, query, pinned=pinned))
+        key = (kind, looked, compiled.key, recall_statements.shape(query, pinned=pinned, near=near))
+        text = self.statements.text(key, lambda: build(compiled, query, pinned=pinned, near=near, looked=looked))
         return text, {**compiled.values, **recall_statements.parameters(query, near=near)}
+
+    def look(self, kind: str, query: Query, wanted: first_look.Wanted) -> Looked | None:
+        """The `wanted` columns of what a query asks for, if a first look of this kind answers it; None otherwise."""
+        compiled = self.compiled(query.cue)
+        pinned, near = hints.of_query(query)
+        seen = 0
+        for look in first_look.looks(compiled, query, pinned=pinned):
+            if not first_look.is_worth(look, seen):
+                continue
+            key = (kind, look, compiled.key, recall_statements.shape(query, pinned=pinned, near=near))
+            text = self.statements.text(key, partial(first_look.look_for, look, compiled, query, wanted, near=near))
+            own = {**recall_statements.parameters(query, near=near), **first_look.parameters(query)}
+            values = {**compiled.values, **own}
+            prepare = None if look.planning is Planning.ANEW else True
+            with self.connections.recalling(look.planning) as connection:
+                rows = connection.execute(text, values, prepare=prepare, binary=True).fetchall()
+            if not rows or rows[0][-1] is None:
+                found = [row for row in rows if row[0] is not None]
+                return Looked(text=text, values=values, planning=look.planning, rows=found)
+            seen = rows[0][-1]
+        return None
 
     def learn(self, rows: Sequence[Sequence[Any]], connection: Connection | None = None) -> None:
         """Have the names at hand that these rows of `recall_statements.columns` mention by number."""

@@ -7,7 +7,8 @@ from typing import Any
 
 from elm.event import StoredEvent
 from elm.features import name_tokens, tokens
-from elm.storage.connections import RECALLING, open_connection
+from elm.storage.connections import open_connection
+from elm.storage.planning import RECALLING
 from simulators.bench.scratch import Connection, connect
 
 # Regions as they are stored: in psycopg's binary results that is their WKB.
@@ -78,18 +79,27 @@ CONDITIONS = MappingProxyType(
         "features.superset": "e.feature_tokens @> %(features)s::text[]",
         "features.intersects": "e.feature_tokens && %(features)s::text[]",
         "feature_names.equal": """
-            hash_array(e.feature_names) = hash_array(%(feature_names)s::text[])
+            hash_array(e.feature_names) + (cardinality(e.feature_names)::bigint << 32)
+                = hash_array(%(feature_names)s::text[]) + (cardinality(%(feature_names)s::text[])::bigint << 32)
             AND (e.feature_names = %(feature_names)s::text[]) IS TRUE
         """,
         # Each subset of the names is looked for as a whole; IS TRUE keeps the planner off the inverted index.
         "feature_names.subset": """
-            hash_array(e.feature_names) = ANY (ARRAY(
-                SELECT hash_array(ARRAY(SELECT n FROM unnest(%(feature_names)s::text[]) WITH ORDINALITY AS u (n, i)
-                                        WHERE number >> (i - 1)::integer & 1 = 1 ORDER BY i))
-                FROM generate_series(0, (1 << cardinality(%(feature_names)s::text[])) - 1) AS s (number)
+            hash_array(e.feature_names) + (cardinality(e.feature_names)::bigint << 32) = ANY (ARRAY(
+                SELECT hash_array(names) + (cardinality(names)::bigint << 32)
+                FROM generate_series(0, (1 << cardinality(%(feature_names)s::text[])) - 1) AS s (number),
+                     LATERAL (SELECT ARRAY(SELECT n FROM unnest(%(feature_names)s::text[]) WITH ORDINALITY AS u (n, i)
+                                           WHERE number >> (i - 1)::integer & 1 = 1 ORDER BY i)) AS t (names)
             )) AND (e.feature_names <@ %(feature_names)s::text[]) IS TRUE
         """,
-        "feature_names.superset": "e.feature_names @> %(feature_names)s::text[]",
+        # Only the same set and larger ones can hold the names: where few are larger, that is found soonest.
+        "feature_names.superset": """
+            e.feature_names @> %(feature_names)s::text[]
+            AND (hash_array(e.feature_names) + (cardinality(e.feature_names)::bigint << 32)
+                     > (cardinality(%(feature_names)s::text[])::bigint << 32) + 2147483647
+                 OR hash_array(e.feature_names) + (cardinality(e.feature_names)::bigint << 32)
+                     = hash_array(%(feature_names)s::text[]) + (cardinality(%(feature_names)s::text[])::bigint << 32))
+        """,
         "feature_names.intersects": "e.feature_names && %(feature_names)s::text[]",
     }
 )

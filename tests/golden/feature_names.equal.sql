@@ -1,3 +1,3 @@
 SELECT event.id
 FROM event
-WHERE (event.feature_names = %(p0)s::TEXT[]) IS true AND hash_array(event.feature_names) = hash_array(%(p0)s::TEXT[]) ORDER BY lower(event.period), event.id
+WHERE (event.feature_names = %(p0)s::TEXT[]) IS true AND hash_array(event.feature_names) + (CAST(cardinality(event.feature_names) AS BIGINT) << 32) = hash_array(%(p0)s::TEXT[]) + (CAST(cardinality(%(p0)s::TEXT[]) AS BIGINT) << 32) ORDER BY lower(event.period), event.id

@@ -13,7 +13,8 @@ import pytest
 from elm import cues
 from elm.errors import StoreClosed, StoreFailure
 from elm.query import Query
-from elm.storage.connections import RECALLING, Connections, open_connection
+from elm.storage.connections import Connections, open_connection
+from elm.storage.planning import RECALLING
 from elm.store import Arrival, Committed, Store
 from tests.servers import MEMORY
 from tests.storage.test_concurrency import Robots, going_on
@@ -66,7 +67,7 @@ def test_a_connection_given_back_while_the_store_closes_is_closed(dsn: str) -> N
     with connections.recalling() as connection:
         connections._lock = _OthersFirst(Thread(target=connections.close))  # type: ignore[assignment]
     assert connection.closed
-    assert not connections._idle
+    assert not any(connections._idle.values())
 
 
 def test_no_connection_is_opened_once_the_store_has_closed(dsn: str, monkeypatch: pytest.MonkeyPatch) -> None:

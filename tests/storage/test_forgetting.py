@@ -23,7 +23,8 @@ from elm.geometry import Region
 from elm.query import Query
 from elm.storage import batch_forgetting, forgetting_statements, migrate, tombstone_rows
 from elm.storage import write_statements as statements
-from elm.storage.connections import WRITING, open_connection
+from elm.storage.connections import open_connection
+from elm.storage.planning import WRITING
 from elm.storage.postgres import PostgresStore
 from elm.storage.tables import REVISION
 from elm.store import Arrival, Closed, Store

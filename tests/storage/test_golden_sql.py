@@ -7,6 +7,7 @@ import re
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping
 from datetime import timedelta
+from functools import partial
 from pathlib import Path
 from typing import Any
 from uuid import UUID
@@ -28,7 +29,8 @@ from elm.interval import AllenRelation
 from elm.query import ByFeature, Cursor, Grouping, Join, JoinRelation, Nearest, Order, Query
 from elm.storage import recall_statements
 from elm.storage.cue_compiler import compile_cue
-from elm.storage.hints import begins_within, is_pinned
+from elm.storage.first_look import Look, Wanted, look_for, looks
+from elm.storage.hints import begins_within, is_pinned, is_planned_once
 from elm.storage.postgres import PostgresStore
 from elm.taxonomy import EventType
 from tests.clock import at, span
@@ -63,6 +65,17 @@ def shown(build: Callable[..., Select[Any]], query: Query) -> str:
     """The SQL text of a question."""
     compiled = compile_cue(query.cue, Numbers())
     statement = build(compiled, query, pinned=is_pinned(query.cue), near=begins_within(query.cue))
+    return str(statement.compile(dialect=recall_statements.DIALECT))
+
+
+def looks_at(query: Query) -> list[Look]:
+    """The first looks at what a question asks for."""
+    return looks(compile_cue(query.cue, Numbers()), query, pinned=is_pinned(query.cue))
+
+
+def look_at(look: Look, query: Query, wanted: Wanted = recall_statements.only_id) -> str:
+    """The SQL text of a look at the ids, or at other columns."""
+    statement = look_for(look, compile_cue(query.cue, Numbers()), query, wanted, near=begins_within(query.cue))
     return str(statement.compile(dialect=recall_statements.DIALECT))
 
 
@@ -111,6 +124,7 @@ CONDITIONS: Mapping[str, Cue] = {
     "subject.within_distance": cues.subject_within(1, _PLACE),
     **{f"features.{relation}": cues.features(relation, {"a": 1}) for relation in SetRelation},
     **{f"feature_names.{relation}": cues.feature_names(relation, ["a"]) for relation in SetRelation},
+    "feature_names.superset.several": cues.feature_names("superset", ["a", "b"]),
     **dict(_feature_cues()),
     "agent": cues.agent("armar7"),
     **{
@@ -216,6 +230,9 @@ def golden() -> dict[str, str]:
     texts = {name: sql_of(cue) for name, cue in (*CONDITIONS.items(), *COMPOSED.items())}
     texts |= {name: shown(recall_statements.find, query) for name, query in QUERIES.items()}
     texts |= {f"{name}.ids": shown(recall_statements.find_ids, query) for name, query in QUERIES.items()}
+    for name, query in (*QUERIES.items(), *((name, Query(cue=cue)) for name, cue in CONDITIONS.items())):
+        for look in looks_at(query):
+            texts[f"{name}.look_{look.value.replace(' ', '_')}"] = look_at(look, query)
     return texts | _questions()
 
 
@@ -376,4 +393,14 @@ def store(postgres_server: Server) -> Iterator[PostgresStore]:
     "query", [*QUERIES.values(), *(Query(cue=cue) for cue in (*CONDITIONS.values(), *COMPOSED.values()))]
 )
 def test_the_store_runs_this_sql(store: PostgresStore, query: Query) -> None:
-    assert store.explain(query).sql == shown(recall_statements.find, query)
+    assert store.explain(query).sql == _answering(query)
+
+
+def _answering(query: Query) -> str:
+    """What answers a question in an empty memory: the first look that can tell that nothing matches."""
+    if is_planned_once(query):
+        return shown(recall_statements.find, query)
+    telling = [look for look in looks_at(query) if look is not Look.IN_ORDER]
+    if telling:
+        return look_at(telling[0], query, recall_statements.columns)
+    return shown(partial(recall_statements.find, looked=bool(looks_at(query))), query)

@@ -20,6 +20,7 @@ from elm.geometry import Region
 from elm.interval import Interval
 from elm.query import Cursor, Nearest, Order, Query
 from elm.storage import recall_statements
+from elm.storage.planning import Planning
 from elm.storage.postgres import PostgresStore
 from elm.store import Arrival
 from simulators.worlds import hierarchy
@@ -543,18 +544,29 @@ _PREPARED = "SELECT statement, generic_plans, custom_plans FROM pg_prepared_stat
 @pytest.mark.parametrize("limit", [None, 100])
 def test_recalls_that_repeat_are_still_planned_for_their_values(life: Life, limit: int | None) -> None:
     """The driver prepares what is run often; then the server must not plan it for any values there may be."""
-    narrow, wide = cues.region("intersects", _region(life.event)), cues.region("subset", Region.box(-1, -1, 201, 201))
+    narrow, wide = (cues.feature_names("superset", [name]) for name in ("serial", "radiation"))
     before = [cost(life.store, Query(cue=cue, limit=limit)) for cue in (narrow, wide)]
     for _ in range(10):
         for cue, known in zip((narrow, wide), before, strict=False):
             assert len(list(life.store.find(Query(cue=cue, limit=limit)))) == known.rows
     with life.store._connections.recalling() as connection:
         prepared = connection.execute(_PREPARED).fetchall()
-    recalls = [row for row in prepared if "ST_CoveredBy" in row[0]]
+    recalls = [row for row in prepared if "feature_names @>" in row[0]]
     assert limit is None or recalls
     assert [(generic, custom >= 4) for _, generic, custom in recalls] == [(0, True)] * len(recalls)
     for cue, known in zip((narrow, wide), before, strict=False):
         assert cost(life.store, Query(cue=cue, limit=limit)).buffers < 1.1 * known.buffers + 5
+
+
+def test_first_looks_are_planned_once(life: Life) -> None:
+    cue = cues.region("intersects", _region(life.event))
+    for _ in range(10):
+        assert list(life.store.find(Query(cue=cue, limit=10)))
+    with life.store._connections.recalling(Planning.BY_INDEX) as connection:
+        prepared = connection.execute(_PREPARED).fetchall()
+    looks = [row for row in prepared if "ST_Intersects" in row[0]]
+    assert sum(generic for _, generic, _ in looks) >= 10
+    assert [custom for _, _, custom in looks] == [0] * len(looks)
 
 
 def test_commits_that_repeat_are_planned_once(life: Life) -> None:

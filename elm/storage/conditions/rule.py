@@ -40,6 +40,15 @@ class Rule:
     """Likewise: something cheap that all fulfil that match, to be asked first of rows that no index chose."""
     narrow: Callable[..., Any] | None = None
     """Likewise: what all fulfil that match, as an index understands it that knows begins too; None without one."""
+    outline: Callable[..., Any] | None = None
+    """Likewise: the same with boxes in place of polygons, next to nothing to judge; None where there is no polygon."""
+    looks: tuple[Callable[..., Any], ...] = ()
+    """Likewise, each: what one index finds, all that match and perhaps others, few of which are read at little cost.
+
+    The planner does not know the values then, and must not take another index: see `exactly`.
+    """
+    judge: Callable[..., Any] | None = None
+    """Likewise: the condition as any plan judges a row in the same short time; None where it is so as built."""
 
     @property
     def is_search(self) -> bool:
@@ -47,9 +56,26 @@ class Rule:
         return self.search is self.build
 
 
-def indexed(key: tuple[Any, ...], values: tuple[tuple[Any, TypeEngine[Any]], ...], build: Callable[..., Any]) -> Rule:
-    """A condition that an index serves as it is."""
-    return Rule(key=key, values=values, build=build, search=build)
+def exactly(indexed_value: Any, wanted: Any) -> SqlCondition:
+    """That an index has this very value, as a look says it.
+
+    By an equation the planner takes the value for as frequent as all others are on average, and may read all events
+    along another index; between two values it does not know it takes one event in two hundred.
+    """
+    return indexed_value.between(wanted, wanted)
+
+
+def indexed(
+    key: tuple[Any, ...],
+    values: tuple[tuple[Any, TypeEngine[Any]], ...],
+    build: Callable[..., Any],
+    *,
+    judge: Callable[..., Any] | None = None,
+    look: Callable[..., Any] | None = None,
+) -> Rule:
+    """A condition that an index serves as it is, how else it is judged, and a look at it, if there are such."""
+    looks = () if look is None else (look,)
+    return Rule(key=key, values=values, build=build, search=build, judge=judge, looks=looks)
 
 
 TIME = TIMESTAMP(timezone=True)

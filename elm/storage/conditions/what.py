@@ -9,9 +9,7 @@ from typing import Any, assert_never
 from sqlalchemy import (
     ARRAY,
     BigInteger,
-    ColumnElement,
     FromClause,
-    Integer,
     Numeric,
     Text,
     and_,
@@ -24,6 +22,7 @@ from sqlalchemy import (
     func,
     literal_column,
     not_,
+    or_,
     select,
     true,
 )
@@ -32,24 +31,31 @@ from sqlalchemy.types import TypeEngine
 
 from elm.cues.algebra import FeatureCue, FeatureNamesCue, FeaturesCue
 from elm.cues.relations import Comparison, SetRelation
-from elm.features import ends_within, fold, kind_of, name_tokens, token, tokens, value_text
+from elm.features import ends, ends_within, fold, kind_of, name_tokens, token, tokens, value_text
 from elm.storage.conditions.compare import COMPARE
-from elm.storage.conditions.rule import TEXTS, Bind, Rule, SqlCondition, indexed
+from elm.storage.conditions.rule import TEXTS, Bind, Rule, SqlCondition, exactly, indexed
+from elm.storage.tables import last_names_key, names_key
 
 
 def feature_names(cue: FeatureNamesCue) -> Rule:
     """The names of an event's features against a given set."""
     given = name_tokens(cue.names)
     rule = _text_set("feature_names", cue.relation, given, "feature_names")
-    # The inverted index would visit all events that share a name, or all that have it; IS TRUE keeps the planner
-    # from taking it.
+    # For whole sets the inverted index would visit all events that share a name, or all that have it; IS TRUE keeps
+    # the planner from taking it.
     match cue.relation:
         case SetRelation.EQUAL:
             return indexed(
-                rule.key, rule.values, lambda e, p: and_(rule.build(e, p).is_(true()), names_hash(e) == _hash(p))
+                rule.key,
+                rule.values,
+                lambda e, p: and_(rule.build(e, p).is_(true()), _is_set(e, p)),
+                judge=rule.build,
+                look=lambda e, p: exactly(names_key(e.c.feature_names), names_key(p)),
             )
         case SetRelation.SUBSET if len(given) <= _MOST_SUBSETS:
             return _by_subsets(rule, given)
+        case SetRelation.SUPERSET if len(given) > 1:
+            return _by_size(rule, len(given))
         case _:
             return rule
 
@@ -58,13 +64,8 @@ _MOST_SUBSETS = 8
 """Names of a set up to which a statement with all its subsets, 256, is soon planned."""
 
 
-def names_hash(e: FromClause) -> ColumnElement[int]:
-    """What the index on whole sets of names has of an event."""
-    return _hash(e.c.feature_names)
-
-
-def _hash(texts: ColumnElement[Any]) -> ColumnElement[int]:
-    return func.hash_array(texts, type_=Integer)
+def _is_set(e: FromClause, names: Bind) -> SqlCondition:
+    return names_key(e.c.feature_names) == names_key(names)
 
 
 def _by_subsets(rule: Rule, given: Sequence[str]) -> Rule:
@@ -74,15 +75,37 @@ def _by_subsets(rule: Rule, given: Sequence[str]) -> Rule:
 
     def build(e: FromClause, p: Bind, *within: Bind) -> SqlCondition:
         # A parameter for each, not all from one sub-select: the planner then knows how many events have them.
-        return and_(rule.build(e, p).is_(true()), names_hash(e) == any_(array([*map(_hash, within)])))
+        keys = [names_key(p, len(subset)) for p, subset in zip(within, subsets, strict=True)]
+        return and_(rule.build(e, p).is_(true()), names_key(e.c.feature_names) == any_(array(keys)))
 
-    return indexed((*rule.key, "by sets", len(given)), values, build)
+    return indexed((*rule.key, "by sets", len(given)), values, build, judge=lambda e, p, *_: rule.build(e, p))
+
+
+def _by_size(rule: Rule, number: int) -> Rule:
+    """Of as many names as given only the same set holds them all: it and the larger ones are asked (docs/adr/0011).
+
+    Where few events have larger sets that is soon done; where many have, the planner takes the inverted index.
+    """
+    values = (*rule.values, (last_names_key(number), BigInteger()))
+
+    def build(e: FromClause, p: Bind, last: Bind) -> SqlCondition:
+        # The larger ones first: most that hold the names are, and then need no second comparison.
+        return and_(rule.build(e, p), or_(names_key(e.c.feature_names) > last, _is_set(e, p)))
+
+    return indexed((*rule.key, "by size"), values, build, judge=lambda e, p, _: rule.build(e, p))
 
 
 def features(cue: FeaturesCue) -> Rule:
     """An event's set of features against a given set."""
     given = tokens(cue.features)
     rule = _text_set("features", cue.relation, given, "feature_tokens")
+    if cue.relation is SetRelation.EQUAL:
+        return indexed(
+            rule.key,
+            (*rule.values, (ends(given), BigInteger())),
+            lambda e, p, _: rule.build(e, p),
+            look=lambda e, _, end: exactly(e.c.feature_ends, end),
+        )
     if cue.relation is not SetRelation.SUBSET or len(given) > _MOST_ENDS:
         return rule
     # The inverted index would visit all events that share a token, the ends find the few that may lie within;
@@ -92,7 +115,7 @@ def features(cue: FeaturesCue) -> Rule:
     def build(e: FromClause, p: Bind, within: Bind) -> SqlCondition:
         return and_(rule.build(e, p).is_(true()), e.c.feature_ends == any_(within))
 
-    return indexed((*rule.key, "by ends"), values, build)
+    return indexed((*rule.key, "by ends"), values, build, judge=lambda e, p, _: rule.build(e, p))
 
 
 _MOST_ENDS = 50

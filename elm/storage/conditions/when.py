@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from datetime import timedelta
 from typing import Any, assert_never
 
@@ -14,7 +14,7 @@ from elm.cues.algebra import DurationCue, TimeCue
 from elm.cues.relations import SetRelation, TimeAxis
 from elm.interval import AllenRelation
 from elm.storage.conditions.compare import COMPARE
-from elm.storage.conditions.rule import TIME, Bind, Rule, SqlCondition, indexed
+from elm.storage.conditions.rule import TIME, Bind, Rule, SqlCondition, exactly, indexed
 
 _MINUS_INFINITY: Bind = literal_column("'-infinity'::timestamptz")
 _PLUS_INFINITY: Bind = literal_column("'infinity'::timestamptz")
@@ -26,15 +26,29 @@ def time(cue: TimeCue) -> Rule:
     key = ("time", cue.axis.value, cue.relation.value, *(bound is None for bound in bounds))
     values = tuple((bound, TIME) for bound in bounds if bound is not None)
 
-    def build(e: FromClause, *binds: Bind) -> SqlCondition:
+    def edges(binds: Sequence[Bind]) -> tuple[Bind, Bind]:
         rest = iter(binds)
-        c = _MINUS_INFINITY if bounds[0] is None else next(rest)
-        d = _PLUS_INFINITY if bounds[1] is None else next(rest)
+        begin = _MINUS_INFINITY if bounds[0] is None else next(rest)
+        return begin, _PLUS_INFINITY if bounds[1] is None else next(rest)
+
+    def build(e: FromClause, *binds: Bind) -> SqlCondition:
+        c, d = edges(binds)
         if cue.axis is TimeAxis.RECORDED_AT:
             return _recorded(cue.relation, e.c.recorded_at, c, d)
         return _during(cue.relation, e.c.period, c, d)
 
-    return indexed(key, values, build)
+    def look(e: FromClause, *binds: Bind) -> SqlCondition:
+        c, d = edges(binds)
+        if cue.axis is TimeAxis.RECORDED_AT:
+            return e.c.recorded_at.between(c, d)
+        return _looked(cue.relation, e.c.period, c, d)
+
+    # What lies beyond the window may be half of the memory, and of one that is open the planner thinks as of that.
+    is_near = cue.relation not in _BEYOND and (cue.axis is TimeAxis.TIME or None not in bounds)
+    return indexed(key, values, build, look=look if is_near else None)
+
+
+_BEYOND = frozenset({SetRelation.DISJOINT, AllenRelation.BEFORE, AllenRelation.AFTER})
 
 
 def _range(begin: Bind, end: Bind) -> ColumnElement[Any]:
@@ -88,6 +102,35 @@ def _during(relation: SetRelation | AllenRelation, period: ColumnElement[Any], c
             return and_(_at(touching, d), b == d, a < c)
         case AllenRelation.EQUALS:
             return period == window
+        case unknown:
+            assert_never(unknown)
+
+
+def _looked(relation: SetRelation | AllenRelation, period: ColumnElement[Any], c: Bind, d: Bind) -> SqlCondition:
+    """What an index finds and stops at any number: no comparison that is judged on what it found."""
+    window = _range(c, d)
+    touching = period.op("&&", is_comparison=True)
+    within = period.op("<@", is_comparison=True)(window)
+    match relation:
+        case SetRelation.EQUAL | AllenRelation.EQUALS:
+            # Of a period that is the window the planner knows less than of one within it (`rule.exactly`).
+            return and_(period == window, within)
+        case SetRelation.SUBSET | AllenRelation.DURING:
+            return within
+        case SetRelation.SUPERSET | AllenRelation.CONTAINS:
+            return period.op("@>", is_comparison=True)(window)
+        case SetRelation.INTERSECTS:
+            return touching(window)
+        case AllenRelation.MEETS | AllenRelation.OVERLAPS:
+            return _at(touching, c)
+        case AllenRelation.OVERLAPPED_BY | AllenRelation.FINISHES | AllenRelation.FINISHED_BY:
+            return _at(touching, d)
+        case AllenRelation.STARTS | AllenRelation.STARTED_BY:
+            return exactly(func.lower(period), c)
+        case AllenRelation.MET_BY:
+            return exactly(func.lower(period), d)
+        case SetRelation.DISJOINT | AllenRelation.BEFORE | AllenRelation.AFTER:
+            raise AssertionError("what lies beyond a window is not looked at by an index")
         case unknown:
             assert_never(unknown)
 

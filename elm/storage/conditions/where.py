@@ -29,16 +29,24 @@ def region(cue: RegionCue, names: Names) -> Rule:
         return and_(e.c[frame_id] == frame, _spatial(cue.relation, e.c[geometry], given, *distance))
 
     # Most of a frame is disjoint from a polygon: there is no index for that.
-    search = None if cue.relation is SpatialRelation.DISJOINT else build
     key = ("region", cue.place.value, cue.relation.value)
-    if cue.relation in (SpatialRelation.DISJOINT, SpatialRelation.WITHIN_DISTANCE):
-        return Rule(key=key, values=values, build=build, search=search)
+    if cue.relation is SpatialRelation.DISJOINT:
+        return Rule(key=key, values=values, build=build)
 
-    def glimpse(e: FromClause, frame: Bind, wkb: Bind) -> SqlCondition:
+    def glimpse(e: FromClause, frame: Bind, wkb: Bind, *distance: Bind) -> SqlCondition:
         # The boxes around both: a predicate of PostGIS takes 5 us a row, and the index is not there to spare it.
-        return e.c[geometry].op("&&", is_comparison=True)(func.ST_GeomFromWKB(wkb, type_=Geometry))
+        given = func.ST_GeomFromWKB(wkb, type_=Geometry)
+        around = func.ST_Expand(given, *distance, type_=Geometry) if distance else given
+        return e.c[geometry].op(_BOXES.get(cue.relation, "&&"), is_comparison=True)(around)
 
-    return Rule(key=key, values=values, build=build, search=search, glimpse=glimpse)
+    def outline(e: FromClause, frame: Bind, *rest: Bind) -> SqlCondition:
+        return and_(e.c[frame_id] == frame, glimpse(e, frame, *rest))
+
+    return Rule(key=key, values=values, build=build, search=build, glimpse=glimpse, outline=outline, looks=(outline,))
+
+
+_BOXES = {SpatialRelation.EQUAL: "~=", SpatialRelation.SUBSET: "@", SpatialRelation.SUPERSET: "~"}
+"""How the boxes stand to each other where the polygons do so, unless they only touch: as PostGIS itself searches."""
 
 
 def _spatial(relation: SpatialRelation, here: ColumnElement[Any], given: Any, *distance: Bind) -> Any:

@@ -1,0 +1,67 @@
+WITH glance AS MATERIALIZED
+(SELECT near.row AS row, near.begin AS begin, near.id AS id
+FROM (SELECT event.id AS id, event.uid AS uid, event.type_id AS type_id, event.period AS period, event.frame_id AS frame_id, event.region AS region, event.subject_frame_id AS subject_frame_id, event.subject AS subject, event.feature_tokens AS feature_tokens, event.feature_names AS feature_names, event.features AS features, event.agent AS agent, event.media_type AS media_type, event.payload AS payload, event.parts AS parts, event.recorded_at AS recorded_at, event.content AS content, event.feature_ends AS feature_ends, event.ctid AS row, lower(event.period) AS begin
+FROM event ORDER BY lower(event.period), event.id
+ LIMIT %(glance)s::INTEGER) AS near
+WHERE NOT (EXISTS (WITH RECURSIVE seen(id) AS
+(SELECT part.part_id AS id
+FROM part
+WHERE part.whole_id = near.id UNION SELECT step.part_id AS part_id
+FROM part AS step JOIN seen ON step.whole_id = seen.id)
+ SELECT 1
+FROM seen
+WHERE seen.id != ALL (array((SELECT other.id
+FROM event AS other
+WHERE other.uid = ANY (%(p0)s::UUID[]) UNION ALL SELECT tombstone.id
+FROM tombstone
+WHERE NOT nothing_forgotten() AND tombstone.uid = ANY (%(p0)s::UUID[])))))) ORDER BY near.begin, near.id
+ LIMIT %(limit)s::BIGINT),
+walk AS MATERIALIZED
+(SELECT near.row AS row, near.begin AS begin, near.id AS id
+FROM (SELECT event.id AS id, event.uid AS uid, event.type_id AS type_id, event.period AS period, event.frame_id AS frame_id, event.region AS region, event.subject_frame_id AS subject_frame_id, event.subject AS subject, event.feature_tokens AS feature_tokens, event.feature_names AS feature_names, event.features AS features, event.agent AS agent, event.media_type AS media_type, event.payload AS payload, event.parts AS parts, event.recorded_at AS recorded_at, event.content AS content, event.feature_ends AS feature_ends, event.ctid AS row, lower(event.period) AS begin
+FROM event ORDER BY lower(event.period), event.id
+ LIMIT %(walk)s::INTEGER) AS near
+WHERE (SELECT count(*) AS count_3
+FROM glance) < %(limit)s::BIGINT AND (SELECT count(*) AS count_3
+FROM glance) * %(walk)s::BIGINT >= %(limit)s::BIGINT * %(glance)s::BIGINT AND NOT (EXISTS (WITH RECURSIVE seen(id) AS
+(SELECT part.part_id AS id
+FROM part
+WHERE part.whole_id = near.id UNION SELECT step.part_id AS part_id
+FROM part AS step JOIN seen ON step.whole_id = seen.id)
+ SELECT 1
+FROM seen
+WHERE seen.id != ALL (array((SELECT other.id
+FROM event AS other
+WHERE other.uid = ANY (%(p0)s::UUID[]) UNION ALL SELECT tombstone.id
+FROM tombstone
+WHERE NOT nothing_forgotten() AND tombstone.uid = ANY (%(p0)s::UUID[])))))) ORDER BY near.begin, near.id
+ LIMIT %(limit)s::BIGINT)
+ SELECT rows.id, answer.seen
+FROM (SELECT CASE WHEN (NOT ((SELECT count(*) AS count_1
+FROM glance) >= %(limit)s::BIGINT OR (SELECT count(*) AS count_2
+FROM walk) >= %(limit)s::BIGINT)) THEN (SELECT count(*) AS count_3
+FROM glance) END AS seen) AS answer LEFT OUTER JOIN (SELECT there.id AS id, there.uid AS uid, there.type_id AS type_id, there.period AS period, there.frame_id AS frame_id, there.region AS region, there.subject_frame_id AS subject_frame_id, there.subject AS subject, there.feature_tokens AS feature_tokens, there.feature_names AS feature_names, there.features AS features, there.agent AS agent, there.media_type AS media_type, there.payload AS payload, there.parts AS parts, there.recorded_at AS recorded_at, there.content AS content, there.feature_ends AS feature_ends, ordered.begin AS begin
+FROM (SELECT places.row AS row, places.begin AS begin, places.id AS id, places.judged AS judged
+FROM (SELECT glance.row AS row, glance.begin AS begin, glance.id AS id, true AS judged
+FROM glance
+WHERE (SELECT count(*) AS count_1
+FROM glance) >= %(limit)s::BIGINT UNION ALL SELECT walk.row AS row, walk.begin AS begin, walk.id AS id, true AS judged
+FROM walk
+WHERE (SELECT count(*) AS count_2
+FROM walk) >= %(limit)s::BIGINT) AS places ORDER BY places.begin, places.id
+ LIMIT ALL OFFSET 0) AS ordered JOIN LATERAL (SELECT event.id AS id, event.uid AS uid, event.type_id AS type_id, event.period AS period, event.frame_id AS frame_id, event.region AS region, event.subject_frame_id AS subject_frame_id, event.subject AS subject, event.feature_tokens AS feature_tokens, event.feature_names AS feature_names, event.features AS features, event.agent AS agent, event.media_type AS media_type, event.payload AS payload, event.parts AS parts, event.recorded_at AS recorded_at, event.content AS content, event.feature_ends AS feature_ends
+FROM event
+WHERE event.ctid = ordered.row AND (ordered.judged OR NOT (EXISTS (WITH RECURSIVE seen(id) AS
+(SELECT part.part_id AS id
+FROM part
+WHERE part.whole_id = event.id UNION SELECT step.part_id AS part_id
+FROM part AS step JOIN seen ON step.whole_id = seen.id)
+ SELECT 1
+FROM seen
+WHERE seen.id != ALL (array((SELECT other.id
+FROM event AS other
+WHERE other.uid = ANY (%(p0)s::UUID[]) UNION ALL SELECT tombstone.id
+FROM tombstone
+WHERE NOT nothing_forgotten() AND tombstone.uid = ANY (%(p0)s::UUID[])))))))
+ LIMIT ALL OFFSET 0) AS there ON true ORDER BY ordered.begin, ordered.id
+ LIMIT %(limit)s::BIGINT) AS rows ON true ORDER BY rows.begin, rows.id
