@@ -69,6 +69,8 @@ class CompiledCue:
     """The same with boxes in place of polygons, all that match and others; None where there is no polygon."""
     looks: tuple[Callable[[FromClause], SqlCondition], ...]
     """What each index finds that serves the cue whatever its values: all that match, and perhaps others."""
+    alone: Callable[[FromClause], SqlCondition] | None
+    """What an index finds, as it is best asked of a cue that is one condition; None where that is as searched."""
     judge: Callable[[FromClause], SqlCondition]
     """The condition, as a plan that does not know the values judges a row as fast."""
 
@@ -97,6 +99,7 @@ def compile_cue(cue: Cue, names: Names, *, prefix: str = "p") -> CompiledCue:
         narrow=bound_if_any(rule.narrow),
         outline=bound_if_any(rule.outline),
         looks=tuple(map(bound, rule.looks)),
+        alone=bound_if_any(rule.alone),
         judge=bound(rule.judge or rule.build),
     )
 
@@ -233,12 +236,21 @@ def _type(cue: TypeCue, names: Names) -> Rule:
                 # But between two begins this is one probe for each type, where that is a join with all in between.
                 return e.c.type_id == any_(func.array(_below(p).scalar_subquery()))
 
+            def alone(e: FromClause, p: Bind) -> SqlCondition:
+                # And for a few of them by the index on types: the planner takes types below it for frequent, and would
+                # read all events for a rare one, but of types between two that it does not know it expects few.
+                below, descendant = type_closure.c.ancestor_id == p, type_closure.c.descendant_id
+                first, last = (select(end(descendant)).where(below).scalar_subquery() for end in (func.min, func.max))
+                return and_(narrow(e, p), e.c.type_id.between(first, last))
+
             def judge(e: FromClause, p: Bind) -> SqlCondition:
                 # And for a row by itself one probe, where a plan for any type might gather all that are below it.
                 below = _below(p).where(type_closure.c.descendant_id == e.c.type_id).correlate(e)
                 return below.scalar_subquery().is_not(null())
 
-            return Rule(key=("type", "is_a"), values=values, build=is_a, search=is_a, narrow=narrow, judge=judge)
+            return Rule(
+                key=("type", "is_a"), values=values, build=is_a, search=is_a, narrow=narrow, alone=alone, judge=judge
+            )
         case unknown:
             assert_never(unknown)
 

@@ -30,7 +30,8 @@ from elm.storage.conditions.rule import SqlCondition
 from elm.storage.cue_compiler import CompiledCue
 from elm.storage.hints import is_in_order
 from elm.storage.planning import Planning
-from elm.storage.row_search import GLANCE_FACTOR, conditions, counted, judged, keys, ordered, place, walked, walks
+from elm.storage.row_order import conditions, keys, ordered, place
+from elm.storage.row_search import GLANCE_FACTOR, counted, judged, walked, walks
 from elm.storage.tables import event
 
 AT_ONCE = 100
@@ -39,8 +40,8 @@ FEW = 100
 """Up to so many candidates that one index finds are judged at once: to read them takes less than to plan for them."""
 MANY = 1_000
 """Up to so many where some of them are wanted, first in order: finding that takes a plan of several steps."""
-GLANCE, WALK, FAR = 100, 500, 40
-"""At least so many events are looked at first in order, and so many after that; at most `FAR` for each one wanted."""
+GLANCE, WALK, FAR = 200, 2_000, 40
+"""So many events are looked at first in order, and so many if they are dense enough, or `FAR` for each one wanted."""
 
 Wanted = Callable[[FromClause], Sequence[ColumnElement[Any]]]
 """The columns of an answer, of an event or what stands for it."""
@@ -69,7 +70,7 @@ class Look(Enum):
     @property
     def planning(self) -> Planning:
         """How it is planned: but for the last, one plan is good for all values."""
-        return Planning.ANEW if self is Look.BY_PLAN else Planning.BY_INDEX
+        return Planning.BY_ANY_INDEX if self is Look.BY_PLAN else Planning.BY_INDEX
 
 
 def looks(compiled: CompiledCue, query: Query, *, pinned: bool) -> list[Look]:
@@ -114,8 +115,9 @@ def look_for(look: Look, compiled: CompiledCue, query: Query, wanted: Wanted, *,
             many, found = _by_indexes(query, compiled.looks, "many", [~filled])
             return _answer(steady, query, wanted, [*walk, *many], or_(filled, found), seen=seen)
         case Look.BY_PLAN:
-            assert compiled.search is not None  # noqa: S101 - or there is no such look
-            return _answer(compiled, query, wanted, *_by_indexes(query, [compiled.search], "few", []), seen=_NOTHING)
+            search = compiled.alone or compiled.search
+            assert search is not None  # noqa: S101 - or there is no such look
+            return _answer(compiled, query, wanted, *_by_indexes(query, [search], "few", []), seen=_NOTHING)
         case unknown:
             assert_never(unknown)
 

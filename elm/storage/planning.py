@@ -24,6 +24,8 @@ RECALLING = {
 }
 # But for events asked for one by one there is one good plan, and to make it anew costs more than to run it.
 ONCE = {**RECALLING, "plan_cache_mode": "force_generic_plan"}
+# Who looks for a few rows by an index is not to read the table from its beginning, because many are expected to match.
+BY_ANY_INDEX = {**RECALLING, "enable_seqscan": "off"}
 # What reads a few entries of an index and stops reads them one by one, never all of them ahead or the table instead.
 BY_INDEX = {**ONCE, "enable_seqscan": "off", "enable_bitmapscan": "off"}
 
@@ -33,7 +35,9 @@ class Planning(Enum):
 
     ANEW = MappingProxyType(RECALLING)
     """Each for its values."""
+    BY_ANY_INDEX = MappingProxyType(BY_ANY_INDEX)
+    """Each for its values, and rows are found by indexes."""
     ONCE = MappingProxyType(ONCE)
     """A prepared one once, whatever its values."""
     BY_INDEX = MappingProxyType(BY_INDEX)
-    """Likewise, and rows are found along indexes alone."""
+    """Likewise, and rows are found one by one along indexes."""

@@ -32,20 +32,8 @@ from sqlalchemy.dialects.postgresql import psycopg
 from elm.interval import Window
 from elm.query import ByFeature, Grouping, Join, JoinRelation, Nearest, Query
 from elm.storage.cue_compiler import CompiledCue
-from elm.storage.row_search import (
-    GLANCE_FACTOR,
-    HANDFUL,
-    WALK_FACTOR,
-    WALK_FEWEST,
-    begin,
-    conditions,
-    found_rows,
-    keys,
-    order,
-    ordered,
-    row,
-    walks,
-)
+from elm.storage.row_order import begin, conditions, keys, order, ordered, row
+from elm.storage.row_search import GLANCE_FACTOR, HANDFUL, WALK_FACTOR, WALK_FEWEST, found_rows, walks
 from elm.storage.row_search import WALK_MOST as WALK_MOST
 from elm.storage.rows import Column
 from elm.storage.tables import event, part

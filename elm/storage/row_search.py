@@ -5,16 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from geoalchemy2 import Geometry
 from sqlalchemy import (
     BigInteger,
     ColumnElement,
     Double,
     FromClause,
     Integer,
-    LargeBinary,
     Select,
-    Text,
     and_,
     bindparam,
     case,
@@ -24,18 +21,17 @@ from sqlalchemy import (
     literal_column,
     select,
     true,
-    tuple_,
     union_all,
 )
 
 from elm.cues.algebra import And
-from elm.cues.relations import Place
 from elm.interval import Window
 from elm.query import Nearest, Order, Query
 from elm.storage.conditions.rule import TIME, Bind, SqlCondition
 from elm.storage.cue_compiler import CompiledCue
 from elm.storage.hints import is_guess, is_in_order
-from elm.storage.tables import event, frame
+from elm.storage.row_order import begin, coming_after, conditions, keys, order, place, row
+from elm.storage.tables import event
 
 WALK_FEWEST, WALK_MOST, WALK_FACTOR = 500, 2_000, 20
 """How far the begin index is walked for a limited answer before the candidates are collected instead."""
@@ -43,16 +39,6 @@ GLANCE_FACTOR = 2
 """How many rows for each one wanted are looked at first: a cue that most events match needs no more."""
 HANDFUL = 50
 """Up to so many candidates, or as many as are wanted, are sorted at once; of more the begin index tells the first."""
-
-
-def begin(e: FromClause) -> ColumnElement[Any]:
-    """When an event began."""
-    return func.lower(e.c.period)
-
-
-def row(e: FromClause) -> ColumnElement[Any]:
-    """Where a row stands: to read it again from there is one page, by its id three."""
-    return literal_column(f"{e.name}.ctid")  # type: ignore[attr-defined]
 
 
 def found_rows(compiled: CompiledCue, query: Query, *, pinned: bool, near: Window, looked: bool = False) -> Any:
@@ -155,7 +141,7 @@ def walked(compiled: CompiledCue, query: Query, near: Window, name: str, when: S
     if along_begin and near.end is not None:
         bounds.append(begin(event) <= bindparam("near_end", type_=TIME))
     # The begin as a column: by it the planner knows that the rows are in order, and stops at the limit.
-    rows = select(event, *place(query)).where(*bounds, *_after(query, event)).order_by(*order(query))
+    rows = select(event, *place(query)).where(*bounds, *coming_after(query, event)).order_by(*order(query))
     rows_near = rows.limit(bindparam(name, type_=Integer)).subquery("near")
     matching = select(rows_near.c.row, rows_near.c.begin, rows_near.c.id)
     glimpse = [] if compiled.glimpse is None else [compiled.glimpse(rows_near)]
@@ -209,7 +195,7 @@ def _searched(
 ) -> Any:
     """What an index finds for the cue, in no order, and one more than `most` if there are more."""
     wanted = [event.c.id] if compiled.is_search else [event]
-    found = select(*wanted, *place(query)).where(when, search(event), *_after(query, event))
+    found = select(*wanted, *place(query)).where(when, search(event), *coming_after(query, event))
     return found.limit(most + literal_column("1")).cte("handful").prefix_with("MATERIALIZED")
 
 
@@ -220,7 +206,7 @@ def _collected(compiled: CompiledCue, query: Query, when: list[SqlCondition]) ->
 def _judged_in_order(compiled: CompiledCue, query: Query, when: list[SqlCondition]) -> Select[Any]:
     """The first that match of what their boxes let through: no more polygons are judged than it takes."""
     assert compiled.outline is not None  # noqa: S101 - the caller has looked
-    boxes = select(*place(query), event.c.id).where(*when, compiled.outline(event), *_after(query, event))
+    boxes = select(*place(query), event.c.id).where(*when, compiled.outline(event), *coming_after(query, event))
     candidates = boxes.cte("candidates").prefix_with("MATERIALIZED")
     ordered, there = judged(query, candidates, lambda _: [compiled.condition(event)])
     found = select(ordered).select_from(ordered.join(there, true())).order_by(*keys(query, ordered))
@@ -239,65 +225,3 @@ def judged(
 def counted(found: FromClause) -> ColumnElement[Any]:
     """How many rows were found."""
     return select(func.count()).select_from(found).scalar_subquery()
-
-
-def place(query: Query) -> list[ColumnElement[Any]]:
-    """Where an event stands and, but for its id, by what it is sorted."""
-    by = order(query)[0].label("distance") if isinstance(query.order, Nearest) else begin(event).label("begin")
-    return [row(event).label("row"), by]
-
-
-def keys(query: Query, found: FromClause) -> list[ColumnElement[Any]]:
-    """The order of a query by the columns of what was found."""
-    if isinstance(query.order, Nearest):
-        return [found.c.distance, found.c.id]
-    if query.order is Order.ID:
-        return [found.c.id]
-    if query.order is Order.BEGIN_REVERSED:
-        return [found.c.begin.desc(), found.c.id.desc()]
-    return [found.c.begin, found.c.id]
-
-
-def conditions(compiled: CompiledCue, query: Query, e: FromClause) -> list[SqlCondition]:
-    """What a row of an answer fulfils: the cue, to come after a cursor, to be in the frame of a distance."""
-    return [compiled.condition(e), *_after(query, e), *_placed(query, e)]
-
-
-def _after(query: Query, e: FromClause) -> list[SqlCondition]:
-    if query.after is None:
-        return []
-    number = bindparam("after_id", type_=BigInteger)
-    if query.order is Order.ID:
-        return [e.c.id > number]
-    here = tuple_(begin(e), e.c.id)
-    there = tuple_(bindparam("after_begin", type_=TIME), number)
-    return [here > there if query.order is Order.BEGIN else here < there]
-
-
-def _placed(query: Query, e: FromClause) -> list[SqlCondition]:
-    if not isinstance(query.order, Nearest):
-        return []
-    # The frame by name: a nearest order has no cue whose frame number would be at hand.
-    name = bindparam("to_frame", type_=Text)
-    numbers = select(frame.c.id).where(frame.c.name == name).scalar_subquery()
-    return [e.c["frame_id" if query.order.place is Place.REGION else "subject_frame_id"] == numbers]
-
-
-def order(query: Query, e: FromClause = event) -> list[ColumnElement[Any]]:
-    """The order of a query by the columns of an event."""
-    match query.order:
-        case Order.BEGIN:
-            return [begin(e), e.c.id]
-        case Order.BEGIN_REVERSED:
-            return [begin(e).desc(), e.c.id.desc()]
-        case Order.ID:
-            return [e.c.id]
-        case Nearest(place=place):
-            to = func.ST_GeomFromWKB(bindparam("to", type_=LargeBinary), type_=Geometry)
-            return [e.c[place.value].op("<->")(to), e.c.id]
-
-
-def ordered(statement: Select[Any], query: Query) -> Select[Any]:
-    """A statement on events in the order of a query, and with its limit."""
-    sorted_rows = statement.order_by(*order(query))
-    return sorted_rows if query.limit is None else sorted_rows.limit(bindparam("limit", type_=BigInteger))

@@ -47,6 +47,8 @@ class Rule:
 
     The planner does not know the values then, and must not take another index: see `exactly`.
     """
+    alone: Callable[..., Any] | None = None
+    """Likewise: what an index finds, as it is best asked if nothing else is; None where that is as searched."""
     judge: Callable[..., Any] | None = None
     """Likewise: the condition as any plan judges a row in the same short time; None where it is so as built."""
 
