@@ -28,7 +28,7 @@ from elm.interval import Window
 from elm.query import Nearest, Order, Query
 from elm.storage.conditions.rule import SqlCondition
 from elm.storage.cue_compiler import CompiledCue
-from elm.storage.hints import is_in_order
+from elm.storage.hints import gathers_kin, is_in_order
 from elm.storage.planning import Planning
 from elm.storage.row_order import conditions, keys, ordered, place
 from elm.storage.row_search import GLANCE_FACTOR, counted, judged, walked, walks
@@ -79,7 +79,7 @@ def looks(compiled: CompiledCue, query: Query, *, pinned: bool) -> list[Look]:
     if is_small and is_in_order(query.cue) and query.order in (Order.BEGIN, Order.BEGIN_REVERSED):
         return [Look.ALONG_INDEX]
     found = [Look.AT_FEW] if compiled.looks else []
-    if is_small and walks(query, pinned=pinned):
+    if is_small and walks(query, pinned=pinned) and not gathers_kin(query.cue):
         found.append(Look.IN_ORDER)
         if not compiled.looks and compiled.search is not None:
             found.append(Look.BY_PLAN)

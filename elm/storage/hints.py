@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from elm.cues.algebra import And, Cue, DurationCue, KinCue, PayloadCue, TimeCue, TypeCue, UidCue
-from elm.cues.relations import SetRelation, TimeAxis, TypeRelation
+from collections.abc import Iterator
+
+from elm.cues.algebra import And, Condition, Cue, DurationCue, KinCue, Not, Or, PayloadCue, TimeCue, TypeCue, UidCue
+from elm.cues.relations import Kin, SetRelation, TimeAxis, TypeRelation
 from elm.interval import AllenRelation, Window
 from elm.query import Nearest, Query
 
@@ -16,6 +18,18 @@ def of_query(query: Query) -> tuple[bool, Window]:
 def conjuncts(cue: Cue) -> tuple[Cue, ...]:
     """The cues that must all hold for `cue` to hold."""
     return cue.args if isinstance(cue, And) else (cue,)
+
+
+def conditions(cue: Cue) -> Iterator[Condition]:
+    """All conditions of a cue, whatever and, or and not they stand under."""
+    if isinstance(cue, And | Or):
+        for arg in cue.args:
+            yield from conditions(arg)
+    elif isinstance(cue, Not):
+        yield from conditions(cue.arg)
+    else:
+        assert isinstance(cue, Condition)  # noqa: S101 - no other node is left
+        yield cue
 
 
 def is_pinned(cue: Cue) -> bool:
@@ -35,6 +49,19 @@ def is_planned_once(query: Query) -> bool:
     """Whether a query's cue says nothing more than that: then one plan is good for whatever is named."""
     is_named = not isinstance(query.cue, And) and is_pinned(query.cue)
     return is_named and not isinstance(query.order, Nearest)
+
+
+def gathers_kin(cue: Cue) -> bool:
+    """Whether judging the first event takes all relatives of what the cue names, which may be half of the memory."""
+    return any(
+        isinstance(each, KinCue)
+        and each.relation is not SetRelation.SUBSET
+        and (each.transitive or each.kin is Kin.WHOLES or each.relation in _GATHERED)
+        for each in conditions(cue)
+    )
+
+
+_GATHERED = frozenset({SetRelation.INTERSECTS, SetRelation.DISJOINT})
 
 
 def is_guess(cue: Cue) -> bool:

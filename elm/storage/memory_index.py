@@ -10,14 +10,14 @@ from uuid import UUID
 from rtree.index import Index
 from sortedcontainers import SortedKeyList
 
-from elm.cues.algebra import And, Condition, Cue, KinCue, Not, Or, RegionCue, TypeCue, UidCue
+from elm.cues.algebra import Cue, KinCue, RegionCue, TypeCue, UidCue
 from elm.cues.match import match
 from elm.cues.relations import Kin, Place, SetRelation
 from elm.event import StoredEvent
 from elm.geometry import SpatialRelation
 from elm.interval import to_micros
 from elm.query import Cursor, Nearest, Order, Query
-from elm.storage.hints import conjuncts
+from elm.storage.hints import conditions, conjuncts
 from elm.storage.memory_events import changed
 from elm.taxonomy import Taxonomy
 from elm.tombstone import Tombstone
@@ -27,18 +27,6 @@ Position = tuple[int, int]
 
 _MARGIN = 1e-6
 """Metres by which a search box is widened, so that rounding a distance never loses a candidate."""
-
-
-def conditions(cue: Cue) -> Iterator[Condition]:
-    """All conditions of a cue, whatever and, or and not they stand under."""
-    if isinstance(cue, And | Or):
-        for arg in cue.args:
-            yield from conditions(arg)
-    elif isinstance(cue, Not):
-        yield from conditions(cue.arg)
-    else:
-        assert isinstance(cue, Condition)  # noqa: S101 - no other node is left
-        yield cue
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from datetime import timedelta
 from itertools import count, product
+from uuid import UUID
 
 import pytest
 from hypothesis import given
@@ -163,6 +164,10 @@ _HOUR = cues.time("subset", at(0), at(0) + timedelta(hours=1))
         # Nothing of the kind: some here and there.
         (cues.feature_names("superset", ["mark"]), 100, [_ORDER], True),
         (cues.lasting(">", timedelta(seconds=1)), 10, [_ORDER], False),
+        # To judge one event takes all relatives of those named.
+        (~cues.parts("intersects", [UUID(int=7)]), 10, [], False),
+        (_THERE & ~cues.parts("intersects", [UUID(int=7)]), 10, [_FEW], True),
+        (~cues.parts("subset", [UUID(int=7)]), 10, [_ORDER], False),
         # An index has them in order, or there is a plan that is good for whatever is named.
         (cues.exactly("Found"), 10, [_ALONG], True),
         (cues.exactly("Found"), None, [_FEW], False),
