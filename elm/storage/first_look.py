@@ -28,7 +28,7 @@ from elm.interval import Window
 from elm.query import Nearest, Order, Query
 from elm.storage.conditions.rule import SqlCondition
 from elm.storage.cue_compiler import CompiledCue
-from elm.storage.hints import gathers_kin, is_in_order
+from elm.storage.hints import gathers_kin, is_in_order, names_features
 from elm.storage.planning import Planning
 from elm.storage.row_order import conditions, keys, ordered, place
 from elm.storage.row_search import GLANCE_FACTOR, counted, judged, walked, walks
@@ -66,11 +66,16 @@ class Look(Enum):
     """The next events in order are judged; if there is too little among them, more places are read from indexes."""
     BY_PLAN = "by plan"
     """As at few, but by what index the planner chooses for the values."""
+    BY_LISTS = "by lists"
+    """Likewise for features, whose index has a list of events for each, to be read whole."""
 
     @property
     def planning(self) -> Planning:
-        """How it is planned: but for the last, one plan is good for all values."""
-        return Planning.BY_ANY_INDEX if self is Look.BY_PLAN else Planning.BY_INDEX
+        """How it is planned: but for the last two, one plan is good for all values."""
+        return _PLANNING.get(self, Planning.BY_INDEX)
+
+
+_PLANNING = {Look.BY_PLAN: Planning.BY_ANY_INDEX, Look.BY_LISTS: Planning.BY_LISTS}
 
 
 def looks(compiled: CompiledCue, query: Query, *, pinned: bool) -> list[Look]:
@@ -82,14 +87,14 @@ def looks(compiled: CompiledCue, query: Query, *, pinned: bool) -> list[Look]:
     if is_small and walks(query, pinned=pinned) and not gathers_kin(query.cue):
         found.append(Look.IN_ORDER)
         if not compiled.looks and compiled.search is not None:
-            found.append(Look.BY_PLAN)
+            found.append(Look.BY_LISTS if names_features(query.cue) else Look.BY_PLAN)
     return found
 
 
 def is_worth(look: Look, seen: int) -> bool:
     """Whether to take a look after others, when so many matched at a glance."""
     # Where some are seen at once there are more in all than one would read in no order.
-    return look is not Look.BY_PLAN or seen == 0
+    return look not in _PLANNING or seen == 0
 
 
 def parameters(query: Query) -> dict[str, int]:
@@ -114,7 +119,7 @@ def look_for(look: Look, compiled: CompiledCue, query: Query, wanted: Wanted, *,
             walk, filled, seen = _by_walking(steady, query, near)
             many, found = _by_indexes(query, compiled.looks, "many", [~filled])
             return _answer(steady, query, wanted, [*walk, *many], or_(filled, found), seen=seen)
-        case Look.BY_PLAN:
+        case Look.BY_PLAN | Look.BY_LISTS:
             search = compiled.alone or compiled.search
             assert search is not None  # noqa: S101 - or there is no such look
             return _answer(compiled, query, wanted, *_by_indexes(query, [search], "few", []), seen=_NOTHING)

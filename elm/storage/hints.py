@@ -4,7 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from elm.cues.algebra import And, Condition, Cue, DurationCue, KinCue, Not, Or, PayloadCue, TimeCue, TypeCue, UidCue
+from elm.cues.algebra import (
+    And,
+    Condition,
+    Cue,
+    DurationCue,
+    FeatureCue,
+    FeatureNamesCue,
+    FeaturesCue,
+    KinCue,
+    Not,
+    Or,
+    PayloadCue,
+    TimeCue,
+    TypeCue,
+    UidCue,
+)
 from elm.cues.relations import Kin, SetRelation, TimeAxis, TypeRelation
 from elm.interval import AllenRelation, Window
 from elm.query import Nearest, Query
@@ -62,6 +77,11 @@ def gathers_kin(cue: Cue) -> bool:
 
 
 _GATHERED = frozenset({SetRelation.INTERSECTS, SetRelation.DISJOINT})
+
+
+def names_features(cue: Cue) -> bool:
+    """Whether a condition on features stands somewhere in a cue."""
+    return any(isinstance(each, FeatureCue | FeatureNamesCue | FeaturesCue) for each in conditions(cue))
 
 
 def is_guess(cue: Cue) -> bool:

@@ -26,6 +26,9 @@ RECALLING = {
 ONCE = {**RECALLING, "plan_cache_mode": "force_generic_plan"}
 # Who looks for a few rows by an index is not to read the table from its beginning, because many are expected to match.
 BY_ANY_INDEX = {**RECALLING, "enable_seqscan": "off"}
+# Lists of what has a feature are intersected whole. If two that are long have little in common, no other index is to be
+# walked from end to end in search of it, because by their lengths much was expected.
+BY_LISTS = {**BY_ANY_INDEX, "enable_indexscan": "off"}
 # What reads a few entries of an index and stops reads them one by one, never all of them ahead or the table instead.
 BY_INDEX = {**ONCE, "enable_seqscan": "off", "enable_bitmapscan": "off"}
 
@@ -37,6 +40,8 @@ class Planning(Enum):
     """Each for its values."""
     BY_ANY_INDEX = MappingProxyType(BY_ANY_INDEX)
     """Each for its values, and rows are found by indexes."""
+    BY_LISTS = MappingProxyType(BY_LISTS)
+    """Each for its values, and rows are found by all that several indexes have, not one by one."""
     ONCE = MappingProxyType(ONCE)
     """A prepared one once, whatever its values."""
     BY_INDEX = MappingProxyType(BY_INDEX)

@@ -123,7 +123,7 @@ class Session:
             text = self.statements.text(key, partial(first_look.look_for, look, compiled, query, wanted, near=near))
             own = {**recall_statements.parameters(query, near=near), **first_look.parameters(query)}
             values = {**compiled.values, **own}
-            prepare = None if look is first_look.Look.BY_PLAN else True
+            prepare = True if look.planning is Planning.BY_INDEX else None
             with self.connections.recalling(look.planning) as connection:
                 rows = connection.execute(text, values, prepare=prepare, binary=True).fetchall()
             if not rows or rows[0][-1] is None:

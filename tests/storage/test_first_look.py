@@ -16,6 +16,7 @@ from elm import cues
 from elm.app import Memory
 from elm.cues.algebra import Cue
 from elm.event import Event
+from elm.features import FeatureValue
 from elm.geometry import Region
 from elm.interval import Interval
 from elm.query import Cursor, Order, Query
@@ -116,7 +117,10 @@ def day(new_store: Callable[[], PostgresStore]) -> PostgresStore:
 
 def _seen(number: int) -> Event:
     marked, far = number % 10 == 0, 5 <= number % 500 < 8
-    features = [("tick", number % 2 == 0), *([("mark", number)] if marked else [])]
+    even = number % 2 == 0
+    features: dict[str, FeatureValue] = {"tick": even, "side": "left" if even else "right"}
+    if marked:
+        features["mark"] = number
     return Event(
         type="Lost" if far else "Found",
         interval=Interval.at(at(0) + timedelta(seconds=number)),
@@ -127,8 +131,10 @@ def _seen(number: int) -> Event:
 
 
 _HERE, _THERE = cues.region("intersects", Region.around(0, 0, 1)), cues.region("intersects", Region.around(40, 0, 1))
-_FEW, _ORDER, _PLAN, _ALONG = Look.AT_FEW, Look.IN_ORDER, Look.BY_PLAN, Look.ALONG_INDEX
+_FEW, _ORDER, _ALONG = Look.AT_FEW, Look.IN_ORDER, Look.ALONG_INDEX
+_PLAN, _LISTS = Look.BY_PLAN, Look.BY_LISTS
 _TICKS = cues.features("superset", {"tick": True})
+_NEVER_TOGETHER = cues.features("superset", {"tick": True, "side": "right"})
 _HOUR = cues.time("subset", at(0), at(0) + timedelta(hours=1))
 
 
@@ -157,8 +163,10 @@ _HOUR = cues.time("subset", at(0), at(0) + timedelta(hours=1))
         (_TICKS, 10, [_ORDER], True),
         (~cues.agent("visitor"), 10, [_ORDER], True),
         # Only far ahead, as the planner finds out.
-        (cues.feature("mark", "=", 700), 10, [_ORDER, _PLAN], True),
-        (cues.feature("mark", "=", 701), 10, [_ORDER, _PLAN], True),
+        (cues.feature("mark", "=", 700), 10, [_ORDER, _LISTS], True),
+        (cues.feature("mark", "=", 701), 10, [_ORDER, _LISTS], True),
+        (_NEVER_TOGETHER, 10, [_ORDER, _LISTS], True),
+        (_NEVER_TOGETHER & cues.is_a("Seen"), 10, [_ORDER, _LISTS], True),
         (cues.features("superset", {"tick": True, "mark": 10}), 100, [_ORDER], False),
         (cues.is_a("Lost") & cues.lasting(">", timedelta(seconds=1)), 10, [_ORDER, _PLAN], True),
         # Nothing of the kind: some here and there.
@@ -182,3 +190,12 @@ def test_looks_are_taken_until_one_answers(
         answer = day._session.look("ids", query, lambda e: [e.c.id])
     assert found == taken
     assert (answer is not None) is is_answered
+
+
+@pytest.mark.parametrize("cue", [_NEVER_TOGETHER, _NEVER_TOGETHER & cues.is_a("Seen")], ids=["alone", "of a type"])
+def test_what_is_never_together_is_not_looked_for_in_all_events(day: PostgresStore, cue: Cue) -> None:
+    """Each of the two is in half of the events, so that the planner expects a quarter of all."""
+    explained = day.explain(Query(cue=cue, limit=10))
+    assert "Bitmap Index Scan on event_feature_tokens_idx" in explained.plan
+    assert "Seq Scan on event" not in explained.plan
+    assert "event_begin_id_idx" not in explained.plan

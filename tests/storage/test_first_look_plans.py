@@ -407,7 +407,7 @@ def _looked(skewed: Skewed, query: Query) -> Iterator[Looked]:
         text = session.statements.text(key, build)
         with skewed.recalling(look.planning) as connection:
             skewed.plans.clear()
-            prepare = None if look.planning is Planning.ANEW else True
+            prepare = True if look.planning is Planning.BY_INDEX else None
             rows = connection.execute(text, values, prepare=prepare, binary=True).fetchall()
             (plan,) = skewed.plans
         answer = [row[0] for row in rows if row[0] is not None] if not rows or rows[0][-1] is None else None
@@ -427,7 +427,7 @@ def _most(look: Look, query: Query, conditions: int) -> int:
             return 700 * conditions
         case Look.IN_ORDER:
             return 6_000 if query.limit == first_look.FEW else 2_000
-        case Look.ALONG_INDEX | Look.BY_PLAN:
+        case Look.ALONG_INDEX | Look.BY_PLAN | Look.BY_LISTS:
             return 700
         case unknown:
             assert_never(unknown)
