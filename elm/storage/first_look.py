@@ -28,7 +28,7 @@ from elm.interval import Window
 from elm.query import Nearest, Order, Query
 from elm.storage.conditions.rule import SqlCondition
 from elm.storage.cue_compiler import CompiledCue
-from elm.storage.hints import gathers_kin, is_in_order, names_features
+from elm.storage.hints import gathers_kin, is_in_order, is_pinned, names_features
 from elm.storage.planning import Planning
 from elm.storage.row_order import conditions, keys, ordered, place
 from elm.storage.row_search import GLANCE_FACTOR, counted, judged, walked, walks
@@ -38,8 +38,10 @@ AT_ONCE = 100
 """So many rows of an answer are held in this process at a time: their payloads may be images."""
 FEW = 100
 """Up to so many candidates that one index finds are judged at once: to read them takes less than to plan for them."""
-MANY = 1_000
-"""Up to so many where some of them are wanted, first in order: finding that takes a plan of several steps."""
+SOME, MANY = 400, 1_000
+"""Up to so many where a few of them are wanted, first in order, at once and when it is in vain to look in order."""
+PEEK = 20
+"""Up to so many events, if no more are wanted, may well be the next ones in order: that is seen first."""
 GLANCE, WALK, FAR = 200, 2_000, 40
 """So many events are looked at first in order, and so many if they are dense enough, or `FAR` for each one wanted."""
 
@@ -60,7 +62,8 @@ class Look(Enum):
     AT_FEW = "at few"
     """For each condition of the cue that an index knows, as many places as are cheap to judge are read from it.
 
-    If there are no more, all that match are among them.
+    If there are no more, all that match are among them. Where only a few events are wanted, those next in order are
+    judged before, for they may all match.
     """
     IN_ORDER = "in order"
     """The next events in order are judged; if there is too little among them, more places are read from indexes."""
@@ -78,13 +81,12 @@ class Look(Enum):
 _PLANNING = {Look.BY_PLAN: Planning.BY_ANY_INDEX, Look.BY_LISTS: Planning.BY_LISTS}
 
 
-def looks(compiled: CompiledCue, query: Query, *, pinned: bool) -> list[Look]:
+def looks(compiled: CompiledCue, query: Query) -> list[Look]:
     """Those that may answer a query, to be taken in turn until one does."""
-    is_small = query.limit is not None and query.limit <= AT_ONCE
-    if is_small and is_in_order(query.cue) and query.order in (Order.BEGIN, Order.BEGIN_REVERSED):
+    if is_small(query) and is_in_order(query.cue) and query.order in (Order.BEGIN, Order.BEGIN_REVERSED):
         return [Look.ALONG_INDEX]
     found = [Look.AT_FEW] if compiled.looks else []
-    if is_small and walks(query, pinned=pinned) and not gathers_kin(query.cue):
+    if _may_walk(query):
         found.append(Look.IN_ORDER)
         if not compiled.looks and compiled.search is not None:
             found.append(Look.BY_LISTS if names_features(query.cue) else Look.BY_PLAN)
@@ -99,10 +101,25 @@ def is_worth(look: Look, seen: int) -> bool:
 
 def parameters(query: Query) -> dict[str, int]:
     """The values of the looks' own parameters."""
-    own = {"few": FEW, "many": MANY}
-    if query.limit is None:
-        return own
-    return {**own, "glance": max(query.limit * GLANCE_FACTOR, GLANCE), "walk": max(query.limit * FAR, WALK)}
+    limit = query.limit
+    if limit is None or not is_small(query):
+        return {"few": FEW}
+    return {
+        "few": SOME,
+        "many": MANY,
+        "peek": limit * GLANCE_FACTOR if limit <= PEEK else 0,
+        "glance": max(limit * GLANCE_FACTOR, GLANCE),
+        "walk": max(limit * FAR, WALK),
+    }
+
+
+def is_small(query: Query) -> bool:
+    """Whether so few events are wanted that they are held at once: on this too depends the statement of a look."""
+    return query.limit is not None and query.limit <= AT_ONCE
+
+
+def _may_walk(query: Query) -> bool:
+    return is_small(query) and walks(query, pinned=is_pinned(query.cue)) and not gathers_kin(query.cue)
 
 
 def look_for(look: Look, compiled: CompiledCue, query: Query, wanted: Wanted, *, near: Window) -> Select[Any]:
@@ -114,7 +131,9 @@ def look_for(look: Look, compiled: CompiledCue, query: Query, wanted: Wanted, *,
             along = select(*wanted(event), null()).where(*known, *conditions(steady, query, event))
             return ordered(along, query)
         case Look.AT_FEW:
-            return _answer(steady, query, wanted, *_by_indexes(query, compiled.looks, "few", []), seen=_NOTHING)
+            next_ones, filled = _by_peeking(steady, query, near) if _may_walk(query) else ([], false())
+            few, found = _by_indexes(query, compiled.looks, "few", [~filled])
+            return _answer(steady, query, wanted, [*next_ones, *few], or_(filled, found), seen=_NOTHING)
         case Look.IN_ORDER:
             walk, filled, seen = _by_walking(steady, query, near)
             many, found = _by_indexes(query, compiled.looks, "many", [~filled])
@@ -147,6 +166,13 @@ def _by_indexes(
         solved = or_(solved, enough)
         unsolved.append(~enough)
     return steps, solved
+
+
+def _by_peeking(compiled: CompiledCue, query: Query, near: Window) -> tuple[_Steps, SqlCondition]:
+    """What matches of the very next events in order, if that is as much as is wanted, and whether it is."""
+    peek = walked(compiled, query, near, "peek", [])
+    filled = counted(peek) >= bindparam("limit", type_=BigInteger)
+    return [select(peek, true().label("judged")).where(filled)], filled
 
 
 def _by_walking(compiled: CompiledCue, query: Query, near: Window) -> tuple[_Steps, SqlCondition, ColumnElement[Any]]:

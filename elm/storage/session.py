@@ -106,7 +106,7 @@ class Session:
         """
         compiled = self.compiled(query.cue)
         pinned, near = hints.of_query(query)
-        looked = looked and bool(first_look.looks(compiled, query, pinned=pinned))
+        looked = looked and bool(first_look.looks(compiled, query))
         key = (kind, looked, compiled.key, recall_statements.shape(query, pinned=pinned, near=near))
         text = self.statements.text(key, lambda: build(compiled, query, pinned=pinned, near=near, looked=looked))
         return text, {**compiled.values, **recall_statements.parameters(query, near=near)}
@@ -116,10 +116,11 @@ class Session:
         compiled = self.compiled(query.cue)
         pinned, near = hints.of_query(query)
         seen = 0
-        for look in first_look.looks(compiled, query, pinned=pinned):
+        for look in first_look.looks(compiled, query):
             if not first_look.is_worth(look, seen):
                 continue
-            key = (kind, look, compiled.key, recall_statements.shape(query, pinned=pinned, near=near))
+            shape = (first_look.is_small(query), recall_statements.shape(query, pinned=pinned, near=near))
+            key = (kind, look, compiled.key, shape)
             text = self.statements.text(key, partial(first_look.look_for, look, compiled, query, wanted, near=near))
             own = {**recall_statements.parameters(query, near=near), **first_look.parameters(query)}
             values = {**compiled.values, **own}

@@ -34,8 +34,11 @@ SOME_CUES = st.lists(single_cues(TYPE_NAMES) | combined_cues(TYPE_NAMES), min_si
 STEPS = st.fixed_dictionaries(
     {
         "FEW": st.integers(0, 3),
+        "SOME": st.integers(0, 3),
         "MANY": st.integers(0, 4),
+        "PEEK": st.integers(0, 3),
         "GLANCE": st.integers(1, 3),
+        "GLANCE_FACTOR": st.just(1),
         "WALK": st.integers(1, 4),
         "FAR": st.integers(1, 2),
     }
@@ -56,9 +59,18 @@ def going(steps: Mapping[str, int]) -> Iterator[list[Look]]:
     with pytest.MonkeyPatch.context() as patched:
         for name, value in steps.items():
             patched.setattr(first_look, name, value)
-        patched.setattr(first_look, "GLANCE_FACTOR", 1)
         patched.setattr(first_look, "is_worth", noted)
         yield taken
+
+
+def test_a_look_for_few_is_not_that_for_many(new_store: Callable[[], PostgresStore]) -> None:
+    """Both have a limit, and the same conditions; the one sees first whether the next events are what is wanted."""
+    store = new_store()
+    store.add_types([])
+    for limit in (AT_ONCE + 1, 5, AT_ONCE + 1, None, 5):
+        assert list(store.find(Query(cue=cues.agent("robot"), limit=limit))) == []
+    texts = [key for key in store._session.statements._texts if Look.AT_FEW in key]
+    assert len(texts) == 3
 
 
 @pytest.fixture(scope="module")
@@ -154,11 +166,12 @@ _HOUR = cues.time("subset", at(0), at(0) + timedelta(hours=1))
         (_HERE & cues.agent("visitor"), None, [_FEW], True),
         (cues.agent("visitor") & _HERE, None, [_FEW], True),
         (_HOUR & cues.agent("robot") & _THERE, 3, [_FEW], True),
-        # Too many: as many as are wanted are met in order.
+        # Too many: as many as are wanted are met in order, at once if they are few.
         (_HERE, None, [_FEW], False),
-        (_HERE, 10, [_FEW, _ORDER], True),
+        (_HERE, 10, [_FEW], True),
+        (_HERE, 21, [_FEW, _ORDER], True),
         (_HERE, AT_ONCE + 1, [_FEW], False),
-        (_HERE & _HOUR & cues.agent("robot"), 10, [_FEW, _ORDER], True),
+        (_HERE & _HOUR & cues.agent("robot"), 50, [_FEW, _ORDER], True),
         (cues.is_a("Seen"), 10, [_ORDER], True),
         (_TICKS, 10, [_ORDER], True),
         (~cues.agent("visitor"), 10, [_ORDER], True),

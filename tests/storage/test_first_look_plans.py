@@ -399,10 +399,11 @@ def _looked(skewed: Skewed, query: Query) -> Iterator[Looked]:
     pinned, near = hints.of_query(query)
     values = {**compiled.values, **recall_statements.parameters(query, near=near), **first_look.parameters(query)}
     seen = 0
-    for look in first_look.looks(compiled, query, pinned=pinned):
+    for look in first_look.looks(compiled, query):
         if not first_look.is_worth(look, seen):
             continue
-        key = ("look", look, compiled.key, recall_statements.shape(query, pinned=pinned, near=near))
+        shape = (first_look.is_small(query), recall_statements.shape(query, pinned=pinned, near=near))
+        key = ("look", look, compiled.key, shape)
         build = partial(first_look.look_for, look, compiled, query, recall_statements.columns, near=near)
         text = session.statements.text(key, build)
         with skewed.recalling(look.planning) as connection:

@@ -70,7 +70,7 @@ def shown(build: Callable[..., Select[Any]], query: Query) -> str:
 
 def looks_at(query: Query) -> list[Look]:
     """The first looks at what a question asks for."""
-    return looks(compile_cue(query.cue, Numbers()), query, pinned=is_pinned(query.cue))
+    return looks(compile_cue(query.cue, Numbers()), query)
 
 
 def look_at(look: Look, query: Query, wanted: Wanted = recall_statements.only_id) -> str:
