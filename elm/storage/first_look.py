@@ -141,7 +141,7 @@ def look_for(look: Look, compiled: CompiledCue, query: Query, wanted: Wanted, *,
         case Look.BY_PLAN | Look.BY_LISTS:
             search = compiled.alone or compiled.search
             assert search is not None  # noqa: S101 - or there is no such look
-            return _answer(compiled, query, wanted, *_by_indexes(query, [search], "few", []), seen=_NOTHING)
+            return _answer(compiled, query, wanted, *_by_indexes(query, [search], "many", []), seen=_NOTHING)
         case unknown:
             assert_never(unknown)
 
