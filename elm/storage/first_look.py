@@ -38,7 +38,7 @@ AT_ONCE = 100
 """So many rows of an answer are held in this process at a time: their payloads may be images."""
 FEW = 100
 """Up to so many candidates that one index finds are judged at once: to read them takes less than to plan for them."""
-SOME, MANY = 400, 1_000
+SOME, MANY = 400, 2_000
 """Up to so many where a few of them are wanted, first in order, at once and when it is in vain to look in order."""
 PEEK = 20
 """Up to so many events, if no more are wanted, may well be the next ones in order: that is seen first."""
