@@ -1,4 +1,4 @@
-"""First looks: what few events match, or most, is found by statements that are planned once, whatever their values."""
+"""First looks: what few events match, or most, is found by bounded statements, before the memory is searched."""
 
 from __future__ import annotations
 

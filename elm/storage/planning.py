@@ -46,3 +46,8 @@ class Planning(Enum):
     """A prepared one once, whatever its values."""
     BY_INDEX = MappingProxyType(BY_INDEX)
     """Likewise, and rows are found one by one along indexes."""
+
+    @property
+    def prepare(self) -> bool | None:
+        """What the driver is told: to prepare what is planned once, and anything else as it sees fit."""
+        return True if self in (Planning.ONCE, Planning.BY_INDEX) else None

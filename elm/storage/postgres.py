@@ -15,19 +15,12 @@ from elm.cues.algebra import Cue
 from elm.errors import MemoryMissing
 from elm.event import StoredEvent
 from elm.query import MOST_ID, ByFeature, Explanation, Group, Grouping, Join, Query
-from elm.storage import (
-    batch_loading,
-    event_writing,
-    grouping,
-    hints,
-    recall_statements,
-    type_writing,
-)
+from elm.storage import batch_loading, event_writing, grouping, hints, recall_statements, type_writing
 from elm.storage import write_statements as sql
 from elm.storage.batch import made_ready
 from elm.storage.connections import Connection, repeated
 from elm.storage.explaining import explain
-from elm.storage.first_look import AT_ONCE
+from elm.storage.first_look import AT_ONCE, is_small
 from elm.storage.one_moment import by_ids, everything, one_moment, pieces, with_parts
 from elm.storage.planning import Planning
 from elm.storage.postgres_forgetting import PostgresForgetting
@@ -145,7 +138,7 @@ class PostgresStore(PostgresForgetting):
             yield from (StoredEvent.of_row(row, decode) for row in looked.rows)
             return
         text, values = self._session.asked("find", query, recall_statements.find, looked=True)
-        if hints.is_pinned(query.cue) or (query.limit is not None and query.limit <= AT_ONCE):
+        if hints.is_pinned(query.cue) or is_small(query):
             yield from self._events(text, values, Planning.ANEW)
         else:
             yield from self._streamed_events(text, values)
@@ -270,8 +263,7 @@ class PostgresStore(PostgresForgetting):
     def _events(self, text: str, values: dict[str, Any], planning: Planning) -> Iterator[StoredEvent]:
         """A few events, fetched at once."""
         with self._connections.recalling(planning) as connection:
-            prepare = None if planning is Planning.ANEW else True
-            rows = connection.execute(text, values, prepare=prepare, binary=True).fetchall()
+            rows = connection.execute(text, values, prepare=planning.prepare, binary=True).fetchall()
             self._session.learn(rows, connection)
         decode = self._session.decode
         for row in rows:

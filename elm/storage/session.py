@@ -1,4 +1,4 @@
-"""What all calls on one memory in PostgreSQL share: its connections, its names, and whether its schema is fit."""
+"""What all calls on one memory in PostgreSQL share: connections, names, whether its schema is fit, first looks."""
 
 from __future__ import annotations
 
@@ -124,9 +124,8 @@ class Session:
             text = self.statements.text(key, partial(first_look.look_for, look, compiled, query, wanted, near=near))
             own = {**recall_statements.parameters(query, near=near), **first_look.parameters(query)}
             values = {**compiled.values, **own}
-            prepare = True if look.planning is Planning.BY_INDEX else None
             with self.connections.recalling(look.planning) as connection:
-                rows = connection.execute(text, values, prepare=prepare, binary=True).fetchall()
+                rows = connection.execute(text, values, prepare=look.planning.prepare, binary=True).fetchall()
             if not rows or rows[0][-1] is None:
                 found = [row for row in rows if row[0] is not None]
                 return Looked(text=text, values=values, planning=look.planning, rows=found)

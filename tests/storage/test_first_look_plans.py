@@ -408,8 +408,7 @@ def _looked(skewed: Skewed, query: Query) -> Iterator[Looked]:
         text = session.statements.text(key, build)
         with skewed.recalling(look.planning) as connection:
             skewed.plans.clear()
-            prepare = True if look.planning is Planning.BY_INDEX else None
-            rows = connection.execute(text, values, prepare=prepare, binary=True).fetchall()
+            rows = connection.execute(text, values, prepare=look.planning.prepare, binary=True).fetchall()
             (plan,) = skewed.plans
         answer = [row[0] for row in rows if row[0] is not None] if not rows or rows[0][-1] is None else None
         seen = len(answer) if answer is not None else rows[0][-1]

@@ -28,8 +28,8 @@ def region(cue: RegionCue, names: Names) -> Rule:
         given = func.ST_GeomFromWKB(wkb, type_=Geometry)
         return and_(e.c[frame_id] == frame, _spatial(cue.relation, e.c[geometry], given, *distance))
 
-    # Most of a frame is disjoint from a polygon: there is no index for that.
     key = ("region", cue.place.value, cue.relation.value)
+    # Most of a frame is disjoint from a polygon: there is no index for that.
     if cue.relation is SpatialRelation.DISJOINT:
         return Rule(key=key, values=values, build=build)
 
